@@ -1,0 +1,79 @@
+"""One RGB-D image with what is known about its camera."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True)
+class Intrinsics:
+    """Pinhole camera: focal lengths and principal point in pixels, pixel centres at integers."""
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """(3, 3) camera matrix K."""
+        return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+    def back_project(self, uv: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """(N, 2) pixels and (N,) depths in metres to (N, 3) points in the camera frame, metres."""
+        x = (uv[:, 0] - self.cx) * z / self.fx
+        y = (uv[:, 1] - self.cy) * z / self.fy
+        return np.stack([x, y, z], axis=1)
+
+    def project(self, points: np.ndarray) -> np.ndarray:
+        """(N, 3) camera-frame points, metres, z > 0, to (N, 2) pixels."""
+        u = self.fx * points[:, 0] / points[:, 2] + self.cx
+        v = self.fy * points[:, 1] / points[:, 2] + self.cy
+        return np.stack([u, v], axis=1)
+
+
+class FrameProblem(Enum):
+    """Why a frame of a sequence cannot be used."""
+
+    UNREADABLE = "unreadable image"
+    SIZE_MISMATCH = "image size differs from the sequence's"
+    NO_DEPTH = "no valid depth"
+    MISSING_POSE = "missing pose"
+
+
+class BrokenFrame(Exception):
+    """Raised by `Sequence.__getitem__`; the run skips the frame, counts it and names it."""
+
+    def __init__(self, name: str, problem: FrameProblem, detail: str = "") -> None:
+        self.name, self.problem, self.detail = name, problem, detail
+        super().__init__(f"{name}: {problem.value}" + (f" ({detail})" if detail else ""))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """An RGB-D image. Camera axes are OpenCV's: x right, y down, z forward.
+
+    Attributes:
+        index: position in the sequence.
+        name: what the dataset calls it (the stem of the colour file); recorded detections are matched by it.
+        stamp: seconds.
+        color: (H, W, 3) uint8, RGB.
+        depth: (H, W) float32, metres along z, registered to colour; 0 = no reading.
+        intrinsics: of both images.
+        T_world_camera: (4, 4) ground-truth pose in the dataset's world, or None.
+        specific_force: (3,) accelerometer reading in camera axes, m/s^2 (points up at rest), or None.
+    """
+
+    index: int
+    name: str
+    stamp: float
+    color: np.ndarray
+    depth: np.ndarray
+    intrinsics: Intrinsics
+    T_world_camera: np.ndarray | None = None
+    specific_force: np.ndarray | None = None

@@ -1,0 +1,14 @@
+"""What a detector is: one call."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from ..datasets.frame import Frame
+from .detections import Detections
+
+
+class Detector(Protocol):
+    """Any callable from a frame to its detections; a plain function serves."""
+
+    def __call__(self, frame: Frame, /) -> Detections: ...

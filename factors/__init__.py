@@ -1,0 +1,1 @@
+"""The model: one file per factor, each with its equation."""

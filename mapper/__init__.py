@@ -1,0 +1,1 @@
+"""The loop, the back end, the map and what people do with it."""

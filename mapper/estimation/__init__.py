@@ -1,0 +1,1 @@
+"""The back end: association, tracks, ledger, smoother, beliefs and lifecycle."""

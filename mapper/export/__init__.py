@@ -1,0 +1,1 @@
+"""Files for other tools, a module a format."""

@@ -1,0 +1,1 @@
+"""Camera motion: odometry, keyframes and the up direction."""

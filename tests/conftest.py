@@ -1,0 +1,17 @@
+"""Fixtures shared by all tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+REAL_DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def real_data() -> Path:
+    """Folder of recorded sequences beside the repository; tests that need it skip where it is absent."""
+    if not REAL_DATA.is_dir():
+        pytest.skip("recorded sequences (../shared/data beside the repository) are absent")
+    return REAL_DATA
