@@ -60,7 +60,8 @@ class Frame:
 
     Attributes:
         index: position in the sequence.
-        name: what the dataset calls it (the stem of the colour file); recorded detections are matched by it.
+        name: what the dataset calls it: the stem of the colour file, without a suffix that says "colour"
+            (frame-000000.color.png is "frame-000000"); recorded detections are matched by it.
         stamp: seconds.
         color: (H, W, 3) uint8, RGB.
         depth: (H, W) float32, metres along z, registered to colour; 0 = no reading.

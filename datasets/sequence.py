@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -14,19 +14,38 @@ from .frame import Frame, Intrinsics
 class Sequence(Protocol):
     """Random access to frames. `__getitem__` raises `BrokenFrame` for a frame that cannot be used.
 
-    Attributes:
-        name: shown to people and written to `map.json`.
-        intrinsics: shared by all frames.
-        poses: (N, 4, 4) ground-truth `T_world_camera`, NaN where a frame has none; None without ground truth.
-        stamps: (N,) seconds.
-        gravity: (3,) unit vector pointing down in the dataset's world axes, or None where unknown.
+    The attributes are properties here so that frozen dataclasses fulfil the protocol; plain attributes do as well.
     """
 
-    name: str
-    intrinsics: Intrinsics
-    poses: np.ndarray | None
-    stamps: np.ndarray
-    gravity: np.ndarray | None
+    @property
+    def name(self) -> str:
+        """Shown to people and written to `map.json`."""
+        ...
+
+    @property
+    def names(self) -> Iterable[str]:
+        """What the dataset calls its frames, in order: `Frame.name` of each."""
+        ...
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """Shared by all frames."""
+        ...
+
+    @property
+    def poses(self) -> np.ndarray | None:
+        """(N, 4, 4) ground-truth `T_world_camera`, NaN where a frame has none; None without ground truth."""
+        ...
+
+    @property
+    def stamps(self) -> np.ndarray:
+        """(N,) seconds."""
+        ...
+
+    @property
+    def gravity(self) -> np.ndarray | None:
+        """(3,) unit vector pointing down in the dataset's world axes, or None where unknown."""
+        ...
 
     def __len__(self) -> int: ...
 

@@ -1,0 +1,97 @@
+"""One way in: a path or the name of a sample becomes a sequence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from . import folder, rgbd_scenes_v1, rgbd_scenes_v2, seven_scenes, tum, tum_keyframes
+from .errors import InputError, UserError
+from .sequence import Sequence
+from .views import subset
+
+SAMPLE_PREFIX = "sample:"
+
+
+@dataclass(frozen=True, slots=True)
+class Loader:
+    """One layout of files.
+
+    Attributes:
+        dataset: what the user calls it.
+        layout: the files it is recognised by, for people.
+        find: the sequence folders of this layout at a path.
+        open: opens one of them.
+    """
+
+    dataset: str
+    layout: str
+    find: Callable[[Path], list[Path]]
+    open: Callable[[Path], Sequence]
+
+
+LOADERS = (
+    Loader("7scenes", seven_scenes.LAYOUT, seven_scenes.find_seven_scenes, seven_scenes.open_seven_scenes),
+    Loader("tum", tum.LAYOUT, tum.find_tum, tum.open_tum),
+    Loader("tum", tum_keyframes.LAYOUT, tum_keyframes.find_tum_keyframes, tum_keyframes.open_tum_keyframes),
+    Loader(
+        "rgbd-scenes-v1", rgbd_scenes_v1.LAYOUT, rgbd_scenes_v1.find_rgbd_scenes_v1, rgbd_scenes_v1.open_rgbd_scenes_v1
+    ),
+    Loader(
+        "rgbd-scenes-v2", rgbd_scenes_v2.LAYOUT, rgbd_scenes_v2.find_rgbd_scenes_v2, rgbd_scenes_v2.open_rgbd_scenes_v2
+    ),
+    Loader("folder", folder.LAYOUT, folder.find_folder, folder.open_folder),
+)
+DATASETS = tuple(dict.fromkeys(loader.dataset for loader in LOADERS))
+
+
+def open_sequence(
+    spec: str | Path, dataset: str | None = None, stride: int = 1, max_frames: int | None = None
+) -> Sequence:
+    """Opens a recorded sequence or a bundled sample.
+
+    Args:
+        spec: a folder, or `sample:NAME`.
+        dataset: one of `DATASETS`; None to tell by the files in the folder.
+        stride: take every n-th frame.
+        max_frames: take at most so many of those; None for all.
+
+    Raises:
+        InputError: there is no such folder, nothing in it is recognised, or it holds several sequences.
+        UserError: an argument is wrong, or there is no such sample.
+    """
+    if str(spec).startswith(SAMPLE_PREFIX):
+        from .synthetic.sample import open_sample  # the renderer is slow to import, and recordings do not need it
+
+        return subset(open_sample(str(spec).removeprefix(SAMPLE_PREFIX)), stride, max_frames)
+    loader, path = _choose(Path(spec).expanduser(), dataset)
+    return subset(loader.open(path), stride, max_frames)
+
+
+def _choose(path: Path, dataset: str | None) -> tuple[Loader, Path]:
+    if dataset is not None and dataset not in DATASETS:
+        raise UserError(f"unknown dataset {dataset!r}; known are {', '.join(DATASETS)}")
+    loaders = [loader for loader in LOADERS if dataset in (None, loader.dataset)]
+    if not path.is_dir():
+        found = "a file" if path.exists() else "no such folder"
+        expected = f"the folder of a sequence ({dataset or ', '.join(DATASETS)})"
+        raise InputError(path, expected, found, f"check the path, or use {SAMPLE_PREFIX}NAME")
+    candidates = [(loader, place) for loader in loaders for place in loader.find(path)]
+    if len(candidates) == 1:
+        return candidates[0]
+    if candidates:
+        found = ", ".join(f"{place} ({loader.dataset})" for loader, place in candidates[:8])
+        more = f" and {len(candidates) - 8} more" if len(candidates) > 8 else ""
+        raise InputError(path, "one sequence", found + more, "give one of these folders, and its dataset if need be")
+    if dataset == "folder":
+        return loaders[0], path  # its own errors say which part is missing
+    looked_for = "; or ".join(f"{loader.layout} ({loader.dataset})" for loader in loaders)
+    raise InputError(path, looked_for, _contents(path), "give the folder that holds a sequence")
+
+
+def _contents(path: Path) -> str:
+    names = sorted(entry.name for entry in path.iterdir())
+    if not names:
+        return "an empty folder"
+    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
