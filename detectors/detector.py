@@ -12,3 +12,8 @@ class Detector(Protocol):
     """Any callable from a frame to its detections; a plain function serves."""
 
     def __call__(self, frame: Frame, /) -> Detections: ...
+
+
+def find_nothing(frame: Frame, /) -> Detections:
+    """The detector of `none`: odometry and geometry without any boxes."""
+    return Detections.empty(())

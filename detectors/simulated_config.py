@@ -1,0 +1,70 @@
+"""How good the simulated detector is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedDetectorConfig:
+    """How good the detector is. All numbers are own choices, in the range of small real-time detectors.
+
+    Attributes:
+        max_recall: chance to find a large, fully visible object.
+        half_visibility: visible share at which half of the objects are found, and
+        visibility_width: the logistic's width in visible share.
+        half_side: pixels, root of the visible box's area at which half are found, and
+        side_width: the logistic's width in octaves of it.
+        mood: how much the viewing direction shifts the two logistics, in their own unit (standard deviation).
+        mood_rate: radians of viewing direction over which that changes.
+        score_range: mean score of hardly and of fully visible objects.
+        score_strength: sum of the beta distribution's parameters; larger means less spread.
+        min_score: detections whose best class scores less are not reported.
+        confusions: pairs of classes and the mean share of the score the wrong one takes of a fully visible object.
+        confusion_growth: factor by which that share has grown when nothing is visible.
+        stray_share: mean share of every other class.
+        split_strength: sum of the Dirichlet distribution's parameters.
+        box_sigma: standard deviation of a box's side, as a share of the box's extent in that direction.
+        box_growth: factor by which it has grown when nothing is visible.
+        box_tail: degrees of freedom of Student's t.
+        amodal: beta parameters of how far a side reaches from the visible part (0) to the whole object (1).
+        background_spots: number of persistent false detections on surfaces; every thing of clutter is one more.
+        spot_chance: chance of a detection of a spot from its best view.
+        spot_sharpness: concentration of that chance about the best view; 8 halves it at 24 degrees.
+        spot_score: beta parameters of a spot's score.
+        chance_rate: false detections a frame that do not come again.
+        chance_score: beta parameters of their score.
+        chance_side: pixels, least and greatest side of their boxes.
+    """
+
+    max_recall: float = 0.96
+    half_visibility: float = 0.32
+    visibility_width: float = 0.08
+    half_side: float = 18.0
+    side_width: float = 0.35
+    mood: float = 0.8
+    mood_rate: float = 0.35
+    score_range: tuple[float, float] = (0.15, 0.84)
+    score_strength: float = 22.0
+    min_score: float = 0.05
+    confusions: tuple[tuple[str, str, float], ...] = (
+        ("cup", "bowl", 0.14),
+        ("soda can", "bottle", 0.12),
+        ("soda can", "cup", 0.10),
+        ("cap", "bowl", 0.10),
+        ("cereal box", "bottle", 0.04),
+    )
+    confusion_growth: float = 2.5
+    stray_share: float = 0.012
+    split_strength: float = 16.0
+    box_sigma: float = 0.03
+    box_growth: float = 2.5
+    box_tail: float = 5.0
+    amodal: tuple[float, float] = (1.2, 2.6)
+    background_spots: int = 5
+    spot_chance: float = 0.55
+    spot_sharpness: float = 8.0
+    spot_score: tuple[float, float] = (4.0, 8.0)
+    chance_rate: float = 0.12
+    chance_score: tuple[float, float] = (1.6, 9.0)
+    chance_side: tuple[float, float] = (16.0, 130.0)

@@ -1,0 +1,128 @@
+"""Detectors by a line of text."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from thingmap.datasets.errors import InputError, UserError
+from thingmap.datasets.views import subset
+from thingmap.detectors.detections import Detections
+from thingmap.detectors.onnx import OnnxDetector
+from thingmap.detectors.onnx.outputs import OutputFamily
+from thingmap.detectors.recorded import RecordedDetections, RecordedFormat, write_detections
+from thingmap.detectors.spec import make_detector
+
+
+@pytest.fixture
+def model(write_onnx, tmp_path: Path) -> Path:
+    (tmp_path / "names.txt").write_text("cup\ndog\n")
+    return write_onnx(np.zeros((1, 6, 84)), input_shape=(1, 3, "h", "w"))
+
+
+def test_onnx_with_options(model: Path):
+    spec = f"onnx:{model}?names={model.parent / 'names.txt'}&confidence=0.3&nms=0.6&max=7&backend=opencv&size=64x64"
+    detector = make_detector(spec)
+    assert isinstance(detector, OnnxDetector)
+    assert detector.classes == ("cup", "dog") and detector.backend == "opencv"
+    assert (detector.confidence, detector.nms_iou, detector.max_detections) == (0.3, 0.6, 7)
+    assert make_detector(f"{model}?names={model.parent / 'names.txt'}&size=64&family=yolov8").family == (  # type: ignore[attr-defined]
+        OutputFamily.YOLOV8.value
+    )
+
+
+def test_recorded(tmp_path: Path, make_frame):
+    path = tmp_path / "found.json"
+    found = Detections.from_best_class(("cup",), [[0, 0, 1, 1]], [0], [0.5])
+    write_detections(path, ("cup",), [("a", found)])
+    for spec in (f"recorded:{path}", str(path), f"recorded:{path}?format=thingmap"):
+        assert len(make_detector(spec)(make_frame("a"))) == 1
+
+
+class Frames:
+    """As much of a sequence as choosing a detector takes."""
+
+    name, intrinsics, poses, stamps, gravity = "frames", None, None, np.arange(10.0), None
+
+    def __init__(self, *names: str) -> None:
+        if names:
+            self.names = names
+
+    def __len__(self) -> int:
+        return 10
+
+
+def test_recorded_for_another_sequence(tmp_path: Path):
+    path = tmp_path / "found.json"
+    write_detections(path, ("cup",), [("a", Detections.empty(("cup",)))])
+    make_detector(str(path), Frames("x", "a"))
+    make_detector(str(path), Frames())
+    with pytest.raises(InputError, match="such as 'x', found 1 frames such as 'a'"):
+        make_detector(str(path), Frames("x", "y"))  # type: ignore[arg-type]
+
+
+def test_recorded_by_position_needs_every_frame(tmp_path: Path):
+    path = tmp_path / "results.json"
+    path.write_text('[{"image_id": 3, "category_id": 1, "bbox": [0, 0, 1, 1], "score": 0.5}]')
+    frames: Any = Frames()
+    assert make_detector(str(path), subset(frames, max_frames=5))
+    with pytest.raises(UserError, match="count all frames, but only some are used"):
+        make_detector(str(path), subset(frames, stride=2))
+
+
+def test_simulated_gets_the_sequence_and_the_options(monkeypatch):
+    made = SimpleNamespace(SimulatedDetector=lambda sequence, **options: (sequence, options))
+    monkeypatch.setitem(sys.modules, "thingmap.detectors.simulated", made)
+    frames: Any = Frames()
+    with pytest.raises(UserError, match="needs a synthetic sequence"):
+        make_detector("simulated", frames)
+    frames.objects, frames.classes, frames.truth = (), (), lambda index: None
+    assert make_detector("simulated?seed=3", frames) == (frames, {"seed": 3})
+    assert make_detector("simulated", frames) == (frames, {})
+
+
+def test_a_folder(tmp_path: Path):
+    (tmp_path / "0_x.txt").write_text("0 0.5 0.5 1 1")
+    for spec in (f"{tmp_path}", f"recorded:{tmp_path}"):
+        detector = make_detector(spec)
+        assert isinstance(detector, RecordedDetections) and detector.format is RecordedFormat.YOLO
+    detector = make_detector(f"{tmp_path}?format=boxes&label=wall cabinet")
+    assert isinstance(detector, RecordedDetections) and detector.classes == ("wall cabinet",)
+
+
+def test_none(make_frame):
+    assert len(make_detector("none")(make_frame())) == 0
+
+
+@pytest.mark.parametrize(
+    ("spec", "message"),
+    [
+        ("yolo:a.pt", "there is no 'yolo'; there are onnx:PATH, recorded:PATH, simulated, none"),
+        ("a.pt", "there is no 'a.pt'; there are"),
+        ("", "there is no ''; there are"),
+        ("onnx", "give path, as in onnx:PATH"),
+        ("onnx:", "give path, as in onnx:PATH"),
+        ("none:a", "there is no path, as in none"),
+        ("onnx:a.onnx?conf=0.1", "there is no option 'conf'; onnx has names, confidence, nms"),
+        ("none?seed=1", "there is no option 'seed'; none has none"),
+        ("onnx:a.onnx?confidence=high", "confidence=high is not a number"),
+        ("onnx:a.onnx?size=wide", "size=wide is not a size such as 640x480"),
+        ("simulated?seed=x", "seed=x is not a whole number"),
+        ("onnx:a.onnx?confidence", "options are name=value.*got 'confidence'"),
+        ("onnx:a.onnx?nms=0.1&nms=0.2", "each once.*got 'nms=0.2'"),
+        ("simulated", "needs a synthetic sequence"),
+    ],
+)
+def test_lines_that_say_nothing_known(spec: str, message: str):
+    with pytest.raises(UserError, match=message):
+        make_detector(spec)
+
+
+def test_files_that_are_not_there(tmp_path: Path):
+    for spec in (f"onnx:{tmp_path}/a.onnx", f"{tmp_path}/a.onnx", f"recorded:{tmp_path}/a", f"{tmp_path}/a.json"):
+        with pytest.raises(InputError, match="no such file"):
+            make_detector(spec)
