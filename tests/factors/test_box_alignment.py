@@ -1,0 +1,139 @@
+"""The box factor: residuals by hand, censored sides, derivatives of the whole robust factor."""
+
+from __future__ import annotations
+
+import gtsam
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from thingmap.datasets.frame import Intrinsics
+from thingmap.factors.box_alignment import box_alignment_factor
+from thingmap.factors.guard import position_guard, size_guard
+from thingmap.factors.robust import HUBER_WIDTH
+from thingmap.factors.volume import project_volumes
+
+X, L, S = gtsam.symbol("x", 0), gtsam.symbol("l", 0), gtsam.symbol("s", 0)
+INTRINSICS = Intrinsics(640, 480, 500.0, 510.0, 319.5, 239.5)
+ALL_SEEN = np.ones(4, bool)
+SIGMA_PX = 4.0
+
+
+def values_of(center, half_axes, pose=None) -> gtsam.Values:
+    values = gtsam.Values()
+    values.insert(X, pose or gtsam.Pose3())
+    values.insertPoint3(L, np.array(center, float))
+    values.insert(S, np.log(np.array(half_axes, float)))
+    return values
+
+
+def predicted_box(values: gtsam.Values) -> np.ndarray:
+    T, center, size = values.atPose3(X).matrix(), values.atPoint3(L), values.atVector(S)
+    return project_volumes(T, np.eye(3), center[None], size[None], INTRINSICS)[0][0]
+
+
+def factor(xyxy, seen=ALL_SEEN) -> gtsam.CustomFactor:
+    return box_alignment_factor(X, L, S, np.asarray(xyxy, float), seen, INTRINSICS, np.eye(3), SIGMA_PX)
+
+
+def test_residual_is_the_distance_of_the_sides_in_sigmas():
+    values = values_of([0.1, -0.2, 2.0], [0.1, 0.2, 0.15])
+    box = predicted_box(values)
+    shift = np.array([1.0, -2.0, 3.0, 0.5])
+    assert factor(box - shift).error(values) == pytest.approx(0.5 * np.sum((shift / SIGMA_PX) ** 2))
+    assert factor(box).error(values) == pytest.approx(0.0, abs=1e-20)
+
+
+def test_a_wrong_box_pulls_linearly():
+    values = values_of([0.1, -0.2, 2.0], [0.1, 0.2, 0.15])
+    shift = np.array([60.0, 0.0, 60.0, 0.0])
+    length = np.linalg.norm(shift / SIGMA_PX)
+    expected = HUBER_WIDTH * (length - HUBER_WIDTH / 2)
+    assert factor(predicted_box(values) - shift).error(values) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("side", "outwards"), [(0, -1.0), (1, -1.0), (2, 1.0), (3, 1.0)], ids=["left", "top", "right", "bottom"]
+)
+def test_an_unseen_side_only_bounds(side, outwards):
+    values = values_of([0.1, -0.2, 2.0], [0.1, 0.2, 0.15])
+    seen = np.arange(4) != side
+    for pixels, expected in [(-25.0, 0.0), (0.0, 0.0), (3.0, 3.0)]:
+        reported = predicted_box(values)
+        reported[side] += outwards * pixels  # the true side is at least there
+        linear = factor(reported, seen).linearize(values)
+        A, b = linear.jacobian()
+        assert factor(reported, seen).error(values) == pytest.approx(0.5 * (expected / SIGMA_PX) ** 2, abs=1e-18)
+        assert A[side].any() == (expected > 0.0)
+        assert np.delete(A, side, axis=0).any(axis=1).all()
+        assert b[side] == pytest.approx(outwards * expected / SIGMA_PX, abs=1e-9)
+
+
+def test_a_clipped_box_may_be_drawn_some_pixels_off_the_border():
+    """The volume reaches 40 px out of the image; detectors put the cut side anywhere near the border."""
+    values = values_of([-1.30, 0.0, 2.0], [0.15, 0.1, 0.1])
+    box = predicted_box(values)
+    assert box[0] < -30.0 < box[2]
+    for drawn in (-60.0, -20.0, 0.0, 6.0):
+        clipped = np.array([drawn, *box[1:]])
+        assert factor(clipped, np.array([False, True, True, True])).error(values) == pytest.approx(0.0, abs=1e-18)
+        assert factor(clipped).error(values) > 1.0
+
+
+@settings(deadline=None, derandomize=True, max_examples=60)
+@given(st.integers(0, 2**32 - 1), st.floats(0.5, 60.0), st.lists(st.booleans(), min_size=4, max_size=4))
+def test_gradient_of_the_whole_factor(seed, noise_px, seen):
+    """-A^T b of the linearised factor is the gradient of its robust error."""
+    rng = np.random.default_rng(seed)
+    pose = gtsam.Pose3(gtsam.Rot3.Expmap(0.2 * rng.normal(size=3)), rng.normal(size=3))
+    center = pose.transformFrom(np.array([0.4 * rng.normal(), 0.4 * rng.normal(), rng.uniform(1.5, 4.0)]))
+    values = values_of(center, rng.uniform(0.05, 0.4, 3), pose)
+    grow = np.array([-1.0, -1.0, 1.0, 1.0]) * rng.uniform(1.0, noise_px + 1.0, 4)  # all sides away from their kinks
+    box = predicted_box(values)
+    shrink = 0.3 * np.tile(box[2:] - box[:2], 2) * [1, 1, -1, -1] * rng.uniform(0.2, 1.0, 4)
+    linear_of = factor(box + (grow if rng.random() < 0.7 else shrink), np.array(seen))
+    A, b = linear_of.linearize(values).jacobian()
+    gradient, h = -A.T @ b, 1e-6
+
+    def error(k: int, step: float) -> float:
+        d = step * np.eye(12)[k]
+        moved = values_of(values.atPoint3(L) + d[6:9], np.exp(values.atVector(S) + d[9:]), pose.retract(d[:6]))
+        return linear_of.error(moved)
+
+    numerical = np.array([(error(k, h) - error(k, -h)) / (2 * h) for k in range(12)])
+    np.testing.assert_allclose(gradient, numerical, atol=1e-4 * (1.0 + np.abs(gradient).max()))
+
+
+def test_a_volume_at_the_camera_leaves_the_graph_solvable_with_guards_only():
+    values = values_of([0.0, 0.0, 0.3], [0.4, 0.4, 0.4])
+    off = factor([300.0, 200.0, 340.0, 260.0])
+    A, b = off.linearize(values).jacobian()
+    assert off.error(values) == 0.0 and not A.any() and not b.any()
+
+    graph = gtsam.NonlinearFactorGraph()
+    graph.add(gtsam.PriorFactorPose3(X, gtsam.Pose3(), gtsam.noiseModel.Isotropic.Sigma(6, 0.01)))
+    graph.add(off)
+    with pytest.raises(RuntimeError, match="Indeterminate"):
+        gtsam.ISAM2().update(graph, values)
+    graph.add(position_guard(L, np.array([0.0, 0.0, 2.0])))
+    graph.add(size_guard(S, np.log([0.1, 0.1, 0.1])))
+    isam = gtsam.ISAM2()
+    isam.update(graph, values)
+    np.testing.assert_allclose(isam.calculateEstimatePoint3(L), [0.0, 0.0, 2.0], atol=1e-9)
+    np.testing.assert_allclose(np.exp(isam.calculateEstimateVector(S)), [0.1, 0.1, 0.1], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("box", "seen", "sigma", "what"),
+    [
+        ([0, 0, np.nan, 1], ALL_SEEN, 3.0, "xyxy"),
+        ([10, 0, 5, 8], ALL_SEEN, 3.0, "xyxy"),
+        ([0, 0, 5], ALL_SEEN, 3.0, "xyxy"),
+        ([0, 0, 5, 5], np.ones(3, bool), 3.0, "sides_seen"),
+        ([0, 0, 5, 5], ALL_SEEN, 0.0, "sigma_px"),
+        ([0, 0, 5, 5], ALL_SEEN, np.inf, "sigma_px"),
+    ],
+)
+def test_bad_measurements_are_refused(box, seen, sigma, what):
+    with pytest.raises(ValueError, match=what):
+        box_alignment_factor(X, L, S, np.array(box, float), seen, INTRINSICS, np.eye(3), sigma)
