@@ -1,0 +1,5 @@
+"""`python -m thingmap.mapper.cli`."""
+
+from .main import main
+
+main()

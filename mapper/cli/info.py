@@ -1,0 +1,166 @@
+"""`thingmap info`: what a sequence, a map or a file of detections holds."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .sources import DatasetOption, MaxFramesOption, StrideOption
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from ...datasets.sequence import Sequence
+    from ..map.object_map import ObjectMap
+
+Line = tuple[str, str]  # what, and its value
+TRIED = 50  # frames, in search of the first that can be used
+
+
+def info(
+    path: Annotated[str, typer.Argument(metavar="PATH", help="A sequence, the OUT of a run, or a detections.json.")],
+    dataset: DatasetOption = None,
+    stride: StrideOption = 1,
+    max_frames: MaxFramesOption = None,
+) -> None:
+    """Show what a sequence, a map or a file of detections holds."""
+    from ...datasets.open import open_sequence
+    from ..map.map_file import FILE_NAME, SCHEMA
+
+    place = Path(path)
+    if (place / FILE_NAME).is_file():
+        lines = [*_map_lines(place), *_report_lines(place)]
+    elif place.is_file():
+        lines = list(_map_lines(place)) if _schema(place) == SCHEMA else list(_detections_lines(place))
+    else:
+        sequence = open_sequence(path, dataset=dataset, stride=stride, max_frames=max_frames)
+        lines = [("sequence", sequence.name), ("loader", _loader(path, dataset)), *_sequence_lines(sequence)]
+    width = max(len(what) for what, _ in lines)
+    for what, value in lines:
+        typer.echo(f"{what:<{width}}  {value}")
+
+
+def _schema(file: Path) -> object:
+    try:
+        document = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None  # the reader of detections says what is wrong with it
+    return document.get("schema") if isinstance(document, dict) else None
+
+
+def _sequence_lines(sequence: Sequence) -> Iterator[Line]:
+    import numpy as np
+
+    k = sequence.intrinsics
+    yield "frames", str(len(sequence))
+    yield "image", f"{k.width} x {k.height}, fx {k.fx:.2f}, fy {k.fy:.2f}, cx {k.cx:.2f}, cy {k.cy:.2f}"
+    if len(sequence):
+        seconds = float(sequence.stamps[-1] - sequence.stamps[0])
+        rate = f", {(len(sequence) - 1) / seconds:.1f} frames/s" if seconds > 0.0 else ""
+        yield "duration", f"{seconds:.2f} s{rate}"
+    yield "poses", "none" if sequence.poses is None else _poses(np.asarray(sequence.poses))
+    down = sequence.gravity
+    yield "gravity", "unknown" if down is None else "down is " + ", ".join(f"{x:.3f}" for x in down)
+    yield from _depth_lines(sequence)
+
+
+def _loader(path: str, dataset: str | None) -> str:
+    """Name of the loader that takes this path, and the layout that it knows."""
+    from ...datasets.open import LOADERS, SAMPLE_PREFIX
+
+    if path.startswith(SAMPLE_PREFIX):
+        return "bundled sample"
+    place = Path(path).expanduser()
+    fitting = [loader for loader in LOADERS if dataset in (None, loader.dataset) and loader.find(place)]
+    return "; ".join(f"{loader.dataset} ({loader.layout})" for loader in fitting) or str(dataset)
+
+
+def _poses(poses: np.ndarray) -> str:
+    import numpy as np
+
+    known = np.isfinite(poses).all(axis=(1, 2))
+    steps = np.linalg.norm(np.diff(poses[known, :3, 3], axis=0), axis=1)
+    return f"{int(known.sum())} of {len(poses)} frames, path of {steps.sum():.2f} m"
+
+
+def _depth_lines(sequence: Sequence) -> Iterator[Line]:
+    """Of the first frame that can be used; those before it are named."""
+    import numpy as np
+
+    from ...datasets.frame import BrokenFrame
+
+    for index in range(min(len(sequence), TRIED)):
+        try:
+            frame = sequence[index]
+        except BrokenFrame as problem:
+            yield "broken frame", str(problem)
+            continue
+        valid = frame.depth[frame.depth > 0.0]
+        share = f"{100.0 * valid.size / frame.depth.size:.0f} % valid"
+        if valid.size:
+            low, middle, high = np.percentile(valid, (1.0, 50.0, 99.0))
+            share += f", {low:.2f} to {high:.2f} m (1 to 99 %), median {middle:.2f} m"
+        yield f"depth of {frame.name}", share
+        return
+
+
+def _map_lines(path: Path) -> Iterator[Line]:
+    from ..map.object_map import ObjectMap
+
+    object_map = ObjectMap.load(path)
+    yield "map of", object_map.source
+    yield "frame", str(object_map.frame)
+    yield "up", _up(object_map)
+    yield "things", f"{len(object_map)}" + _counts([thing.label for thing in object_map.things])
+    yield "classes", f"{len(object_map.classes)}: " + ", ".join(object_map.classes)
+
+
+def _up(object_map: ObjectMap) -> str:
+    import math
+
+    up = object_map.up
+    direction = ", ".join(f"{x:.3f}" for x in up.direction)
+    return f"{direction} ± {math.degrees(up.std_rad):.1f} degrees, from {up.source}"
+
+
+def _report_lines(path: Path) -> Iterator[Line]:
+    from ..map.store import OutputFolder
+
+    folder = OutputFolder(path)
+    if not folder.report_file.is_file():
+        return
+    report = folder.read_report()
+    yield (
+        "run",
+        (
+            f"{report.get('frames_used')} of {report.get('frames_total')} frames, {report.get('keyframes')} keyframes, "
+            f"{report.get('seconds')} s, {report.get('frames_per_second')} frames/s"
+        ),
+    )
+    if report.get("skipped"):
+        yield "skipped", ", ".join(f"{len(names)} with {problem}" for problem, names in report["skipped"].items())
+    if report.get("stopped"):
+        yield "stopped", str(report["stopped"])
+
+
+def _detections_lines(path: Path) -> Iterator[Line]:
+    from ...detectors.recorded.formats import read_recording
+    from ...detectors.recorded.recording import ReadOptions
+
+    format_, recording = read_recording(path, None, ReadOptions())
+    yield "detections", f"format {format_.value}, frames found by {recording.matched_by.value}"
+    labels = [recording.classes[k] for found in recording.frames.values() for k in found.class_id]
+    yield "frames", str(len(recording.frames))
+    yield "boxes", f"{len(labels)}" + _counts(labels)
+    yield "classes", f"{len(recording.classes)}: " + ", ".join(recording.classes)
+
+
+def _counts(labels: list[str]) -> str:
+    from collections import Counter
+
+    common = Counter(sorted(labels)).most_common()
+    return ": " + ", ".join(f"{count} {label}" for label, count in common) if common else ""

@@ -1,0 +1,116 @@
+"""One mapping job of the command line: run, keep what came of it, tell the user."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from .interrupt import stop_on_interrupt
+from .progress import FrameProgress
+from .sources import missing_line, skipped_line
+from .tables import print_things
+
+if TYPE_CHECKING:
+    from ...datasets.sequence import Sequence
+    from ...detectors.detector import Detector
+    from ..map.object_map import ObjectMap
+    from ..map.store import OutputFolder
+    from ..runner import Mapper, Progress, SequenceRun
+
+
+@dataclass(slots=True)
+class MappingJob:
+    """Everything that `thingmap run` needs once the options are understood.
+
+    Attributes:
+        sequence: what to map.
+        mapper: fresh.
+        detector: the one that the mapper calls.
+        spec: its name, for messages.
+        folder: where to write.
+        config: YAML of the configuration in use.
+        command: the options, for the report.
+        include_doubtful: write things whose existence is below 0.5 too.
+    """
+
+    sequence: Sequence
+    mapper: Mapper
+    detector: Detector
+    spec: str
+    folder: OutputFolder
+    config: str
+    command: dict[str, Any]
+    include_doubtful: bool
+    _run: SequenceRun = field(init=False)
+
+    def execute(self) -> None:
+        """Map, save and print; what was mapped before a failure or Ctrl-C is saved too.
+
+        Raises:
+            typer.Exit: with 130 after Ctrl-C.
+            UserError: nothing could be mapped, or a mistake of the user came to light on the way.
+            Exception: whatever else ended the run.
+        """
+        from ..runner import SequenceRun
+
+        with stop_on_interrupt() as should_stop:
+            with FrameProgress("mapping", len(self.sequence)) as progress:
+                self._run = SequenceRun(self.sequence, self.mapper, _shower(progress), should_stop)
+                try:
+                    self._run.execute()
+                except Exception as error:
+                    self._rescue(error)
+                    raise
+            missing = missing_line(self.spec, self.detector, self._run.report)
+            object_map = self._save() if self._run.report.frames_used else None
+        self._tell(object_map, missing)
+
+    def _save(self) -> ObjectMap:
+        from ..saving import save_run
+
+        report, folder = self._run.report, self.folder
+        details = {"config": self.config, "command": self.command, "include_doubtful": self.include_doubtful}
+        return save_run(folder, self.mapper, report, **details)
+
+    def _rescue(self, error: Exception) -> None:
+        """Keep what was mapped before a failure; a failure of saving must not hide the first one."""
+        from ...datasets.errors import UserError
+
+        if not self._run.report.frames_used:
+            return
+        try:
+            self._save()
+            outcome = f"what was mapped before is in {self.folder.path}"
+        except Exception as second:
+            outcome = f"what was mapped before could not be saved ({second})"
+        if isinstance(error, UserError):
+            raise UserError(f"{error}; {outcome}") from error
+        typer.echo(f"{self._run.report.stopped}; {outcome}", err=True)
+
+    def _tell(self, object_map: ObjectMap | None, missing: str | None) -> None:
+        report, path = self._run.report, self.folder.path
+        for line in (skipped_line(report.skipped), missing):
+            if line is not None:
+                typer.echo(line, err=True)
+        if object_map is None:
+            typer.echo(f"{report.stopped}, before anything was mapped; nothing is written", err=True)
+            raise typer.Exit(130)
+        print_things(object_map.things)
+        pace = f"{report.frames_used} frames in {report.seconds:.1f} s, {report.frames_per_second:.1f} frames/s"
+        typer.echo(f"{len(object_map)} things from {pace}, {report.keyframes} keyframes; the map is in {path}")
+        if report.stopped:
+            typer.echo(f"{report.stopped}; what was mapped before is in {path}", err=True)
+            raise typer.Exit(130)
+
+
+def _shower(progress: FrameProgress) -> Callable[[Progress], None]:
+    def show(now: Progress) -> None:
+        if now.done == now.skipped:
+            return  # nothing is mapped yet, and perhaps nothing can be
+        skipped = f", {now.skipped} skipped" if now.skipped else ""
+        progress.show(now.done, f"{now.things} things{skipped}")
+
+    return show

@@ -1,0 +1,201 @@
+"""The append-only list of measurements from which the graph can be rebuilt.
+
+It is the saved session, the journal and the crash recovery in one: GTSAM's custom factors and ISAM2 do not serialise,
+measurements do.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from ...datasets.errors import InputError
+
+SCHEMA = "thingmap-ledger/1"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Gauge:
+    """Where the first keyframe is: (4, 4) `T_world_camera` and its sigmas (rad, m)."""
+
+    T_world_camera: np.ndarray
+    sigmas: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """Odometry between keyframes `a` and `b`: (4, 4) `T_a_b` and its (6, 6) covariance."""
+
+    a: int
+    b: int
+    T_a_b: np.ndarray
+    covariance: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Visual:
+    """Motion between keyframes `a` and `b` from image features: (4, 4) `T_a_b`, (6, 6) covariance."""
+
+    a: int
+    b: int
+    T_a_b: np.ndarray
+    covariance: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UpPrior:
+    """What is known of the world's up direction beforehand: (3,) unit vector, world axes; sigma in rad."""
+
+    direction: np.ndarray
+    sigma: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Up:
+    """Up as measured in one keyframe: (3,) unit vector, camera axes; sigma in rad."""
+
+    keyframe: int
+    direction: np.ndarray
+    sigma: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NewLandmark:
+    """A landmark enters the graph: (3,) position, world, metres; (3,) log half-axes."""
+
+    landmark: int
+    position: np.ndarray
+    log_size: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DepthCentre:
+    """Object centre from depth: (3,) camera frame, metres; sigmas across and along the ray, metres."""
+
+    keyframe: int
+    landmark: int
+    centre: np.ndarray
+    sigma_tangential: float
+    sigma_range: float
+    visibility: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Box:
+    """Detection box (4,) pixels; (4,) bool, sides that are not cut off by the image border; sigma in pixels."""
+
+    keyframe: int
+    landmark: int
+    xyxy: np.ndarray
+    sides_seen: np.ndarray
+    sigma_px: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """What one keyframe said about a landmark: weighted hits and misses, free-space log ratio (nats)."""
+
+    keyframe: int
+    landmark: int
+    hits: float
+    misses: float
+    free: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scores:
+    """Detector scores (K,) of a landmark, its occlusion then, and the view's weight."""
+
+    keyframe: int
+    landmark: int
+    scores: np.ndarray
+    occlusion: float
+    weight: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Merge:
+    """`absorbed` turned out to be `kept`: its measurements count for `kept` from now on."""
+
+    kept: int
+    absorbed: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Retire:
+    """The landmark is no object: its measurements leave the graph."""
+
+    landmark: int
+
+
+Record = Gauge | Motion | Visual | UpPrior | Up | NewLandmark | DepthCentre | Box | Look | Scores | Merge | Retire
+KINDS: tuple[type, ...] = (
+    Gauge, Motion, Visual, UpPrior, Up, NewLandmark, DepthCentre, Box, Look, Scores, Merge, Retire
+)  # fmt: skip
+
+
+class Ledger:
+    """Records in the order in which they were made."""
+
+    def __init__(self) -> None:
+        self._records: list[Record] = []
+
+    def append(self, record: Record) -> int:
+        """Adds a record; returns its number."""
+        self._records.append(record)
+        return len(self._records) - 1
+
+    def __len__(self) -> int:
+        return len(self._records)
+
+    def __getitem__(self, index: int) -> Record:
+        return self._records[index]
+
+    def __iter__(self) -> Iterator[Record]:
+        return iter(self._records)
+
+    def save(self, path: Path, meta: dict | None = None) -> None:
+        """Writes one array per kind and field (`.npz`), with the records' numbers, and `meta` as JSON."""
+        arrays: dict[str, np.ndarray] = {"meta": np.array(json.dumps({"schema": SCHEMA, **(meta or {})}))}
+        for kind in KINDS:
+            numbered = [(i, r) for i, r in enumerate(self._records) if type(r) is kind]
+            if not numbered:
+                continue
+            arrays[f"{kind.__name__}/number"] = np.array([i for i, _ in numbered])
+            for f in fields(kind):
+                arrays[f"{kind.__name__}/{f.name}"] = np.stack([np.asarray(getattr(r, f.name)) for _, r in numbered])
+        with path.open("wb") as file:
+            np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
+
+    @classmethod
+    def load(cls, path: Path) -> tuple[Ledger, dict]:
+        """The ledger and its `meta`.
+
+        Raises:
+            InputError: where the file is not a ledger.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                arrays = {name: file[name] for name in file.files}
+            meta = json.loads(str(arrays.pop("meta")))
+        except (OSError, ValueError, KeyError) as error:
+            raise InputError(path, "a ledger (.npz)", str(error), "give the ledger.npz of a run") from None
+        if meta.get("schema") != SCHEMA:
+            raise InputError(path, f"schema {SCHEMA}", repr(meta.get("schema")), "map the sequence again")
+        numbered: list[tuple[int, Record]] = []
+        for kind in KINDS:
+            numbers = arrays.get(f"{kind.__name__}/number", np.empty(0, dtype=int))
+            columns = [_column(arrays[f"{kind.__name__}/{f.name}"], f.type) for f in fields(kind) if len(numbers)]
+            numbered += [(int(n), kind(*row)) for n, row in zip(numbers, zip(*columns, strict=True), strict=True)]
+        ledger = cls()
+        ledger._records = [record for _, record in sorted(numbered, key=lambda item: item[0])]
+        return ledger, meta
+
+
+def _column(values: np.ndarray, kind: object) -> list:
+    """Rows as arrays, or as plain numbers where the field is one."""
+    return list(values) if kind == "np.ndarray" else values.tolist()

@@ -1,0 +1,156 @@
+"""`map.json`: the document "thingmap/1", written from a map and read back with every mistake named."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...datasets.errors import InputError
+from .atomic import make_folder, write_atomic
+from .object_map import MapFrame, ObjectMap, UpDirection
+from .record import Record
+from .thing import Evidence, Thing
+
+SCHEMA = "thingmap/1"
+FILE_NAME = "map.json"
+DOUBTFUL_BELOW = 0.5  # existence: what more likely is not there is not written, unless asked for
+NEGLIGIBLE = 1e-4  # class probability that is not written
+
+
+def write_map(object_map: ObjectMap, path: Path, include_doubtful: bool = False) -> Path:
+    """Write the map to a `.json` file, or as `map.json` into a folder, made where absent; returns the file's path."""
+    folder = path.is_dir() or path.suffix != ".json"
+    file = path / FILE_NAME if folder else path
+    make_folder(file.parent)
+    write_atomic(file, format_document(to_document(object_map, include_doubtful)).encode())
+    return file
+
+
+def read_map(path: Path) -> ObjectMap:
+    """Read a map from its file or from the folder that holds `map.json`.
+
+    Raises:
+        InputError: there is no such file, it is not JSON, or it is not a "thingmap/1" document.
+    """
+    file = path / FILE_NAME if path.is_dir() else path
+    try:
+        text = file.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise InputError(file, f"a map ({FILE_NAME})", "nothing", "give the output folder of `thingmap run`") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(file, "a readable text file", str(error), "check the file and its permissions") from None
+    try:
+        document = json.loads(text)
+    except json.JSONDecodeError as error:
+        where = f"broken JSON at line {error.lineno} ({error.msg})"
+        raise InputError(file, "a map in JSON", where, "write the map again with `thingmap run`") from None
+    return from_document(document, file)
+
+
+def to_document(object_map: ObjectMap, include_doubtful: bool = False) -> dict[str, Any]:
+    """The map as plain JSON values.
+
+    Class probabilities below 1e-4 are left out and the others are kept as they are, not scaled up: what is missing from
+    a sum of 1 belongs to the classes that are absent, and dividing by the sum renormalises.
+    """
+    up = object_map.up
+    return {
+        "schema": SCHEMA,
+        "source": object_map.source,
+        "frame": str(object_map.frame),
+        "up": {
+            "direction": up.direction.tolist(),
+            "std_deg": float(np.degrees(up.std_rad)),
+            "source": up.source,
+        },
+        "classes": list(object_map.classes),
+        "things": [
+            thing_to_dict(thing) for thing in object_map.things if include_doubtful or thing.existence >= DOUBTFUL_BELOW
+        ],
+    }
+
+
+def from_document(document: Any, file: Path) -> ObjectMap:
+    """The inverse of `to_document`; `file` is named in errors, which are `InputError`."""
+    root = Record(document, file)
+    if root.text("schema") != SCHEMA:
+        remedy = "open it with the version of thingmap that wrote it"
+        raise InputError(file, f'the schema "{SCHEMA}"', repr(root.text("schema")), remedy)
+    up = root.record("up")
+    with root.explaining():
+        return ObjectMap(
+            things=tuple(_thing_from(record) for record in root.records("things")),
+            classes=root.texts("classes"),
+            source=root.text("source"),
+            frame=MapFrame(root.choice("frame", tuple(MapFrame))),
+            up=_up_from(up),
+        )
+
+
+def format_document(document: Mapping[str, Any]) -> str:
+    """JSON text with one line for each value of a thing: short enough to read, one change a line to compare."""
+    lines = []
+    for key, value in document.items():
+        if key != "things":
+            lines.append(f" {json.dumps(key)}: {_compact(value)}")
+            continue
+        things = (",\n".join(f"   {json.dumps(k)}: {_compact(v)}" for k, v in thing.items()) for thing in value)
+        body = ",\n".join(f"  {{\n{thing}\n  }}" for thing in things)
+        lines.append(f' "things": [\n{body}\n ]' if body else ' "things": []')
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _compact(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+
+
+def thing_to_dict(thing: Thing) -> dict[str, Any]:
+    """One thing of the document; its classes are ordered by probability."""
+    ranked = sorted(thing.class_posterior.items(), key=lambda item: (-item[1], item[0]))
+    return {
+        "id": thing.id,
+        "label": thing.label,
+        "probability": thing.probability,
+        "existence": thing.existence,
+        "class_posterior": {label: p for label, p in ranked if p >= NEGLIGIBLE or label == thing.label},
+        "position": thing.position.tolist(),
+        "position_covariance": thing.position_covariance.tolist(),
+        "size": thing.size.tolist(),
+        "size_std": thing.size_std.tolist(),
+        "yaw": thing.yaw,
+        "first_seen": thing.first_seen,
+        "last_seen": thing.last_seen,
+        "evidence": asdict(thing.evidence),
+    }
+
+
+def _thing_from(record: Record) -> Thing:
+    evidence = record.record("evidence")
+    with record.explaining():
+        return Thing(
+            id=record.text("id"),
+            label=record.text("label"),
+            probability=record.number("probability"),
+            existence=record.number("existence"),
+            class_posterior=record.numbers_by_name("class_posterior"),
+            position=record.array("position", (3,)),
+            position_covariance=record.array("position_covariance", (3, 3)),
+            size=record.array("size", (3,)),
+            size_std=record.array("size_std", (3,)),
+            yaw=record.number("yaw"),
+            first_seen=record.number("first_seen"),
+            last_seen=record.number("last_seen"),
+            evidence=Evidence(*(evidence.count(name) for name in ("supporting", "occluded", "contradicting"))),
+        )
+
+
+def _up_from(record: Record) -> UpDirection:
+    with record.explaining():
+        return UpDirection(
+            record.array("direction", (3,)), float(np.radians(record.number("std_deg"))), record.text("source")
+        )

@@ -1,0 +1,175 @@
+"""The output folder of a run: its files, and the promise never to clear one."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...datasets.errors import InputError, UserError
+from .atomic import make_folder, replacing, write_atomic
+from .map_file import FILE_NAME as MAP_FILE
+from .object_map import ObjectMap
+
+AGAIN = "write it again with `thingmap run`"
+TRAJECTORY_HEADER = "stamp tx ty tz qx qy qz qw: T_world_camera in seconds and metres"
+
+
+@dataclass(frozen=True, slots=True)
+class OutputFolder:
+    """A folder that holds one mapped sequence. Every file is written whole or not at all; nothing is ever deleted."""
+
+    path: Path
+
+    @staticmethod
+    def check(path: str | Path, overwrite: bool = False) -> None:
+        """Raise `UserError` where `create` would refuse the path; nothing is made."""
+        path = Path(path)
+        if path.exists() and not path.is_dir():
+            raise InputError(path, "a folder to write to", "a file", "choose another folder")
+        if path.is_dir() and not overwrite and any(path.iterdir()):
+            raise UserError(f"{path}: the folder is not empty; choose another one, or replace its map with --overwrite")
+
+    @classmethod
+    def create(cls, path: str | Path, overwrite: bool = False) -> OutputFolder:
+        """A folder to write to, made with its parents where absent.
+
+        Raises:
+            UserError: it is a file or cannot be made; it holds something and `overwrite` is not set. With `overwrite`
+                the files of a run are replaced one by one and everything else stays.
+        """
+        cls.check(path, overwrite)
+        make_folder(Path(path))
+        return cls(Path(path))
+
+    @classmethod
+    def open(cls, path: str | Path) -> OutputFolder:
+        """A folder to read from; raises `InputError` where it holds no map."""
+        path = Path(path)
+        if not (path / MAP_FILE).is_file():
+            found = "a file" if path.is_file() else f"no {MAP_FILE} in it" if path.is_dir() else "nothing"
+            raise InputError(path, "the output folder of a run", found, "give the folder that `thingmap run` wrote")
+        return cls(path)
+
+    @property
+    def map_file(self) -> Path:
+        """`ObjectMap.load` reads it."""
+        return self.path / MAP_FILE
+
+    @property
+    def trajectory_file(self) -> Path:
+        """TUM format, a line for every frame that was mapped."""
+        return self.path / "trajectory.txt"
+
+    @property
+    def config_file(self) -> Path:
+        """The configuration as it was used, with every default."""
+        return self.path / "config.yaml"
+
+    @property
+    def report_file(self) -> Path:
+        """What happened: frames, times, outcomes."""
+        return self.path / "report.json"
+
+    @property
+    def cloud_file(self) -> Path:
+        """Coloured points, map frame, metres."""
+        return self.path / "cloud.ply"
+
+    @property
+    def ledger_file(self) -> Path:
+        """The mapper's measurements, from which its graph can be rebuilt."""
+        return self.path / "ledger.npz"
+
+    def write_map(self, object_map: ObjectMap, include_doubtful: bool = False) -> None:
+        object_map.save(self.map_file, include_doubtful)
+
+    def write_trajectory(self, stamps: np.ndarray, T_world_camera: np.ndarray) -> None:
+        """(N,) seconds and (N, 4, 4) poses as TUM lines `stamp tx ty tz qx qy qz qw`."""
+        from scipy.spatial.transform import Rotation
+
+        poses = np.asarray(T_world_camera, dtype=np.float64).reshape(-1, 4, 4)
+        rows = np.column_stack([np.asarray(stamps, dtype=np.float64), poses[:, :3, 3], _quaternions(poses, Rotation)])
+        formats = ["%.6f"] + ["%.6f"] * 3 + ["%.8f"] * 4
+        with replacing(self.trajectory_file) as temporary:
+            np.savetxt(temporary, rows, fmt=formats, header=TRAJECTORY_HEADER)
+
+    def write_cloud(self, points: np.ndarray, colors: np.ndarray) -> None:
+        """(M, 3) metres and (M, 3) uint8 RGB as binary PLY."""
+        from plyfile import PlyData, PlyElement
+
+        vertices = np.empty(len(points), dtype=[*((axis, "<f4") for axis in "xyz"), *_COLOR_FIELDS])
+        for column, axis in enumerate("xyz"):
+            vertices[axis] = points[:, column]
+        for column, (name, _) in enumerate(_COLOR_FIELDS):
+            vertices[name] = colors[:, column]
+        with replacing(self.cloud_file) as temporary:
+            PlyData([PlyElement.describe(vertices, "vertex")], byte_order="<").write(str(temporary))
+
+    def write_config(self, text: str) -> None:
+        write_atomic(self.config_file, text.encode())
+
+    def write_report(self, report: dict[str, Any]) -> None:
+        """Values as JSON; a number that is not finite, which JSON cannot hold, becomes null."""
+        text = json.dumps(_plain(report), indent=1, ensure_ascii=False, allow_nan=False, default=str)
+        write_atomic(self.report_file, f"{text}\n".encode())
+
+    def read_map(self) -> ObjectMap:
+        """The map; raises `InputError` as `ObjectMap.load`."""
+        return ObjectMap.load(self.map_file)
+
+    def read_trajectory(self) -> tuple[np.ndarray, np.ndarray]:
+        """(N,) stamps in seconds and (N, 4, 4) `T_world_camera`."""
+        from scipy.spatial.transform import Rotation
+
+        try:
+            lines = self.trajectory_file.read_text(encoding="utf-8").splitlines()
+            fields = [line.split() for line in lines if line.strip() and line[0] != "#"]
+            if wrong := [row for row in fields if len(row) != 8]:
+                raise ValueError(f"a line of {len(wrong[0])}")
+            rows = np.array(fields, dtype=np.float64).reshape(-1, 8)
+        except (OSError, ValueError) as error:
+            raise InputError(self.trajectory_file, "lines of 8 numbers", str(error), AGAIN) from None
+        poses = np.tile(np.eye(4), (len(rows), 1, 1))
+        if len(rows):
+            poses[:, :3, :3] = Rotation.from_quat(rows[:, 4:]).as_matrix()
+        poses[:, :3, 3] = rows[:, 1:4]
+        return rows[:, 0], poses
+
+    def read_cloud(self) -> tuple[np.ndarray, np.ndarray]:
+        """(M, 3) float64 metres and (M, 3) uint8 RGB."""
+        from plyfile import PlyData, PlyParseError
+
+        try:
+            vertices = PlyData.read(str(self.cloud_file))["vertex"].data
+            points = np.stack([vertices[axis] for axis in "xyz"], axis=1).astype(np.float64)
+            return points, np.stack([vertices[name] for name, _ in _COLOR_FIELDS], axis=1)
+        except (OSError, KeyError, ValueError, PlyParseError) as error:
+            raise InputError(self.cloud_file, "a coloured cloud in PLY", str(error), AGAIN) from None
+
+    def read_report(self) -> dict[str, Any]:
+        try:
+            return json.loads(self.report_file.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise InputError(self.report_file, "a report in JSON", str(error), AGAIN) from None
+
+
+_COLOR_FIELDS = (("red", "u1"), ("green", "u1"), ("blue", "u1"))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    if isinstance(value, np.generic | np.ndarray):
+        return _plain(value.tolist())
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def _quaternions(poses: np.ndarray, rotation: Any) -> np.ndarray:
+    """(N, 4) x, y, z, w with w >= 0."""
+    return rotation.from_matrix(poses[:, :3, :3]).as_quat(canonical=True) if len(poses) else np.empty((0, 4))

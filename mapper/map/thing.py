@@ -1,0 +1,129 @@
+"""One thing of the map: what it probably is, where it probably is, and on what evidence."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from .boxes import box_corners
+
+POSTERIOR_TOLERANCE = 1e-4  # how far `probability` and `class_posterior[label]` may differ through rounding
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """How many views spoke for a thing, could not see it, and spoke against it."""
+
+    supporting: int
+    occluded: int
+    contradicting: int
+
+    def __post_init__(self) -> None:
+        for name in ("supporting", "occluded", "contradicting"):
+            count = operator.index(getattr(self, name))  # NumPy's integers become Python's
+            if count < 0:
+                raise ValueError(f"{name} must not be negative, but got {count}")
+            object.__setattr__(self, name, count)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Thing:
+    """A countable object as an upright box.
+
+    Attributes:
+        id: stable name, such as "thing-0007".
+        label: its likeliest class.
+        probability: P(label | it exists).
+        existence: P(it exists).
+        class_posterior: label -> P(label | it exists). A class that is absent has a probability too small to be kept,
+            so the sum may fall short of 1 by what was left out.
+        position: (3,) centre, metres, map frame.
+        position_covariance: (3, 3) of `position`, m^2.
+        size: (3,) full extents along the box's own axes, metres; the third is the height along up.
+        size_std: (3,) standard deviations of `size`, metres.
+        yaw: radians about up, from the upright frame's x axis (`upright_rotation`) to the box's.
+        first_seen: stamp of the first supporting view, seconds.
+        last_seen: stamp of the last supporting view, seconds.
+        evidence: counts of views.
+
+    Raises:
+        ValueError: where a shape or a value is not as above; it says which and what was found.
+    """
+
+    id: str
+    label: str
+    probability: float
+    existence: float
+    class_posterior: Mapping[str, float]
+    position: np.ndarray
+    position_covariance: np.ndarray
+    size: np.ndarray
+    size_std: np.ndarray
+    yaw: float
+    first_seen: float
+    last_seen: float
+    evidence: Evidence
+
+    def __post_init__(self) -> None:
+        for name, shape in (("position", (3,)), ("position_covariance", (3, 3)), ("size", (3,)), ("size_std", (3,))):
+            object.__setattr__(self, name, _read_only(name, getattr(self, name), shape))
+        for name in ("probability", "existence", "yaw", "first_seen", "last_seen"):
+            object.__setattr__(self, name, _finite(name, getattr(self, name)))
+        posterior = {str(label): _finite(f"class_posterior[{label!r}]", p) for label, p in self.class_posterior.items()}
+        object.__setattr__(self, "class_posterior", posterior)
+        self._check()
+
+    def _check(self) -> None:
+        if not self.label:
+            raise ValueError("label must not be empty")
+        for name in ("probability", "existence"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ValueError(f"{name} must be in [0, 1], but got {getattr(self, name)}")
+        values = self.class_posterior.values()
+        if any(not 0.0 <= p <= 1.0 for p in values) or sum(values) > 1.0 + POSTERIOR_TOLERANCE:
+            raise ValueError(f"class_posterior must be probabilities that sum to at most 1, got {self.class_posterior}")
+        kept = self.class_posterior.get(self.label)
+        if kept is None or abs(kept - self.probability) > POSTERIOR_TOLERANCE:
+            raise ValueError(f"probability {self.probability} must be class_posterior[{self.label!r}], which is {kept}")
+        if np.any(self.size < 0.0) or np.any(self.size_std < 0.0):
+            raise ValueError(f"size and size_std must not be negative, but got {self.size} and {self.size_std}")
+        covariance = self.position_covariance
+        scale = max(float(np.max(np.abs(covariance))), 1e-300)
+        if not np.allclose(covariance, covariance.T, rtol=0.0, atol=1e-6 * scale):
+            raise ValueError(f"position_covariance must be symmetric, but got {covariance.tolist()}")
+        if np.linalg.eigvalsh(covariance)[0] < -1e-6 * scale:
+            raise ValueError(f"position_covariance must have no negative eigenvalue, but got {covariance.tolist()}")
+
+    @property
+    def position_std(self) -> np.ndarray:
+        """(3,) standard deviations of `position` along the map's axes, metres."""
+        return np.sqrt(np.maximum(np.diag(self.position_covariance), 0.0))
+
+    def belief(self, label: str) -> float:
+        """P(it exists and is a `label`); upper and lower case are the same, 0 for a class it never was."""
+        wanted = label.casefold()
+        return self.existence * sum(p for name, p in self.class_posterior.items() if name.casefold() == wanted)
+
+    def corners(self, R_world_upright: np.ndarray) -> np.ndarray:
+        """(8, 3) corners of the box, metres, map frame; order and edges as in `boxes`."""
+        return box_corners(self.position, self.size, self.yaw, R_world_upright)
+
+
+def _read_only(name: str, value: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    array = np.array(value, dtype=np.float64)
+    if array.shape != shape:
+        raise ValueError(f"{name} must have shape {shape}, but got {array.shape}")
+    if not np.all(np.isfinite(array)):
+        raise ValueError(f"{name} must be finite, but got {array.tolist()}")
+    array.setflags(write=False)
+    return array
+
+
+def _finite(name: str, value: float) -> float:
+    number = float(value)
+    if not np.isfinite(number):
+        raise ValueError(f"{name} must be finite, but got {number}")
+    return number

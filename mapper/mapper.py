@@ -1,0 +1,203 @@
+"""The mapper: frames go in one by one, the map can be read at any time."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..datasets.errors import UserError
+from ..datasets.frame import Frame
+from ..detectors.detections import Detections
+from ..detectors.detector import Detector
+from ..factors.size_prior import load_size_priors
+from .config import MapperConfig
+from .estimation.association import associate
+from .estimation.evidence import EvidenceModels, Observer, class_evidence, score_evidence
+from .estimation.lifecycle import Lifecycle
+from .estimation.lifting import LiftedDetection, lift
+from .estimation.outcomes import Outcome
+from .estimation.scene import Scene
+from .estimation.view import View
+from .map.compose import compose_things
+from .map.object_map import PROBABLE, ObjectMap
+from .stages import StageClock
+from .trajectory.camera import CameraGraph
+from .trajectory.cloud import KeyframeCloud
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapUpdate:
+    """What a frame did.
+
+    Attributes:
+        frame_index: of the frame.
+        is_keyframe: whether it entered the graph.
+        T_world_camera: (4, 4) its pose as estimated now.
+        things: number of landmarks that are probably objects.
+    """
+
+    frame_index: int
+    is_keyframe: bool
+    T_world_camera: np.ndarray
+    things: int
+
+
+class SemanticMapper:
+    """Maps things from RGB-D frames and a detector's boxes.
+
+    Args:
+        detector: called on keyframes; may be None when `process_frame` is given detections.
+        config: every number of the mapper.
+        source: name of what is mapped, kept in the map.
+        gravity: (3,) unit vector pointing down in the dataset's world, where known; used with the dataset's poses.
+    """
+
+    def __init__(
+        self,
+        detector: Detector | None = None,
+        config: MapperConfig | None = None,
+        *,
+        source: str = "",
+        gravity: np.ndarray | None = None,
+    ) -> None:
+        self.config = config or MapperConfig()
+        self._detector, self._source = detector, source
+        self._models = EvidenceModels()
+        self._camera = CameraGraph(self.config, gravity)
+        self._cloud = KeyframeCloud(self.config.cloud)
+        self._scene = Scene()
+        self._outcomes: Counter[Outcome] = Counter()
+        self._clock = StageClock()
+        self._classes: tuple[str, ...] | None = None
+        self._lifecycle: Lifecycle | None = None
+        self._observer: Observer | None = None
+
+    def process_frame(self, frame: Frame, detections: Detections | None = None) -> MapUpdate:
+        """Adds one frame.
+
+        Args:
+            frame: the next image.
+            detections: of this frame; without them the detector is asked, on keyframes only.
+
+        Raises:
+            BrokenFrame: where the frame cannot be registered; the map stays as it was.
+            UserError: where detections name other classes than before, or there is no detector.
+        """
+        with self._clock.stage("odometry"):
+            is_keyframe = self._camera.track(frame)
+        if is_keyframe:
+            with self._clock.stage("up"):
+                view = self._camera.add_keyframe(frame)
+            with self._clock.stage("detection"):
+                lifted = self._detect(frame, detections)
+            self._map(view, lifted)
+            with self._clock.stage("cloud"):
+                self._cloud.add(frame, view.keyframe, self._camera.smoother.pose(view.keyframe))
+        return MapUpdate(frame.index, is_keyframe, self._camera.pose(), self._count_things())
+
+    def _map(self, view: View, lifted: list[LiftedDetection]) -> None:
+        """One keyframe: visibility -> association -> factors -> smoothing -> class and existence -> lifecycle."""
+        config, scene, models, stage = self.config, self._scene, self._models, self._clock.stage
+        assert self._lifecycle is not None and self._observer is not None
+        lifecycle, observer, smoother = self._lifecycle, self._observer, self._camera.smoother
+        with stage("visibility"):
+            targets, visibility = scene.predict(view, config.association)
+        with stage("association"):
+            scores = score_evidence(lifted, models.appearance)
+            evidence = class_evidence(scores, scene.members())
+            camera = view.T_world_camera, view.R_world_upright
+            assignment = associate(lifted, targets, evidence, *camera, config.association)
+        with stage("factors"):
+            touched = observer.observe(view, lifted, assignment, targets, visibility)
+            lifecycle.start_tracks(view, lifted, scores, assignment)
+            touched |= lifecycle.promote_and_drop()
+        with stage("smoothing"):
+            smoother.update()
+        with stage("beliefs"):
+            lifecycle.refresh(touched)
+        with stage("lifecycle"):
+            if view.keyframe % config.lifecycle.merge_every == 0:
+                lifecycle.merge()
+            lifecycle.retire()
+
+    def object_map(self, include_doubtful: bool = False) -> ObjectMap:
+        """The map as estimated now; `include_doubtful` adds what exists with less than 0.5 and what was retired."""
+        landmarks = list(self._scene.landmarks.values())
+        if self._lifecycle is not None:
+            self._camera.smoother.settle()
+            for landmark in landmarks:
+                self._lifecycle.refresh_fully(landmark)
+            self._camera.smoother.settle()
+        if include_doubtful:
+            landmarks += self._scene.retired.values()
+        things = compose_things(landmarks, self._classes or (), 0.0 if include_doubtful else PROBABLE)
+        return ObjectMap(
+            things=things,
+            classes=self._classes or (),
+            source=self._source,
+            frame=self._camera.map_frame,
+            up=self._camera.up(),
+        )
+
+    def trajectory(self) -> tuple[np.ndarray, np.ndarray]:
+        """(N,) stamps and (N, 4, 4) `T_world_camera` of every processed frame, as estimated now."""
+        return self._camera.trajectory()
+
+    def cloud(self) -> tuple[np.ndarray, np.ndarray]:
+        """(M, 3) float32 points, world, metres, and (M, 3) uint8 RGB, one a voxel."""
+        poses = self._camera.smoother.poses() if self._camera.started else np.empty((0, 4, 4))
+        return self._cloud.assemble(poses)
+
+    def statistics(self) -> dict[str, Any]:
+        """Stage timings, outcome counts, sizes of the graph; JSON-able."""
+        smoother = self._camera.smoother if self._camera.started else None
+        return {
+            "keyframes": smoother.keyframes if smoother else 0,
+            "landmarks": len(self._scene.landmarks),
+            "candidates": len(self._scene.tracks),
+            "retired": len(self._scene.retired),
+            "graph_rebuilds": smoother.rebuilds if smoother else 0,
+            "ledger_records": len(smoother.ledger) if smoother else 0,
+            "outcomes": {outcome.name.lower(): self._outcomes[outcome] for outcome in Outcome},
+            "stages": self._clock.summary(),
+        }
+
+    def save_ledger(self, path: Path) -> None:
+        """Writes every measurement, from which the graph can be rebuilt (`Ledger.load`)."""
+        if self._camera.started:
+            k = self._camera.intrinsics
+            self._camera.smoother.ledger.save(path, {"intrinsics": asdict(k), "classes": list(self._classes or ())})
+
+    def _detect(self, frame: Frame, detections: Detections | None) -> list[LiftedDetection]:
+        if detections is None:
+            if self._detector is None:
+                raise UserError("no detections: give the mapper a detector, or process_frame the frame's detections")
+            detections = self._detector(frame)
+        if self._classes is None:
+            self._classes = tuple(detections.classes)
+            self._start_back_end(self._classes)
+        elif tuple(detections.classes) != self._classes:
+            raise UserError(
+                f"frame {frame.name}: expected detections over the same {len(self._classes)} classes as before, found "
+                f"{len(detections.classes)} classes; use one detector for a map"
+            )
+        lifted, refused = lift(detections, frame, self.config.lifting)
+        self._outcomes.update(refused)
+        return lifted
+
+    def _start_back_end(self, classes: tuple[str, ...]) -> None:
+        config, smoother = self.config, self._camera.smoother
+        extra = Path(config.class_sizes) if config.class_sizes else None
+        priors = load_size_priors(classes, extra)
+        self._observer = Observer(self._scene, smoother, self._models, self._outcomes)
+        configs = config.tracks, config.beliefs, config.lifecycle
+        self._lifecycle = Lifecycle(
+            self._scene, smoother, self._observer, priors, self._models.rate, configs, self._outcomes
+        )
+
+    def _count_things(self) -> int:
+        return sum(landmark.belief.existence >= PROBABLE for landmark in self._scene.landmarks.values())

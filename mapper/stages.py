@@ -1,0 +1,37 @@
+"""How long each stage of the loop takes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+
+class StageClock:
+    """Milliseconds per stage; keeps every reading as a float32, 4 bytes a keyframe."""
+
+    def __init__(self) -> None:
+        self._readings: dict[str, list[np.float32]] = {}
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Times the block under `name`."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self._readings.setdefault(name, []).append(np.float32(1e3 * (time.perf_counter() - start)))
+
+    def summary(self) -> dict[str, dict[str, float]]:
+        """Per stage: count, median_ms, p95_ms, total_s."""
+        return {
+            name: {
+                "count": len(readings),
+                "median_ms": round(float(np.median(readings)), 3),
+                "p95_ms": round(float(np.percentile(readings, 95)), 3),
+                "total_s": round(float(np.sum(readings)) / 1e3, 3),
+            }
+            for name, readings in self._readings.items()
+        }

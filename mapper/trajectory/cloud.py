@@ -1,0 +1,79 @@
+"""The coloured cloud of what has been seen, anchored to keyframes so that it moves when the graph moves."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from ...datasets.frame import Frame
+from ..config import CloudConfig
+
+EMPTY = np.int64(-1)
+KEY_BITS = 21  # per axis: 2 million voxels, 40 km at 2 cm
+KEY_OFFSET = 1 << (KEY_BITS - 1)
+
+
+class KeyframeCloud:
+    """Points of keyframes, one per voxel of the world as it was estimated then; memory grows with the space seen."""
+
+    def __init__(self, config: CloudConfig) -> None:
+        self._config = config
+        self._table = np.full(1 << 16, EMPTY)
+        self._count = 0
+        self._points: list[np.ndarray] = []
+        self._colors: list[np.ndarray] = []
+        self._keyframes: list[int] = []
+
+    def add(self, frame: Frame, keyframe: int, T_world_camera: np.ndarray) -> None:
+        """Adds the points of a keyframe that lie in voxels without one."""
+        c, k = self._config, frame.intrinsics
+        depth = frame.depth[:: c.pixel_step, :: c.pixel_step]
+        v, u = np.nonzero((depth > 0.0) & (depth < c.max_range))
+        uv = np.stack([u, v], axis=1) * c.pixel_step
+        points = k.back_project(uv, depth[v, u].astype(np.float64))
+        keys = voxel_keys(points @ T_world_camera[:3, :3].T + T_world_camera[:3, 3], c.voxel_size)
+        if 2 * (self._count + len(keys)) > len(self._table):
+            self._table = _grown(self._table, 2 * (self._count + len(keys)))
+        new = _insert(self._table, keys)
+        self._count += int(new.sum())
+        self._points.append(points[new].astype(np.float32))
+        self._colors.append(frame.color[uv[new, 1], uv[new, 0]])
+        self._keyframes.append(keyframe)
+
+    def assemble(self, T_world_keyframe: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(N, 3) float32 points, world, metres, and (N, 3) uint8 RGB, under the given (M, 4, 4) keyframe poses."""
+        if not self._points:
+            return np.empty((0, 3), dtype=np.float32), np.empty((0, 3), dtype=np.uint8)
+        moved = [
+            points @ T_world_keyframe[t][:3, :3].T.astype(np.float32) + T_world_keyframe[t][:3, 3].astype(np.float32)
+            for t, points in zip(self._keyframes, self._points, strict=True)
+        ]
+        return np.concatenate(moved), np.concatenate(self._colors)
+
+
+def voxel_keys(points: np.ndarray, size: float) -> np.ndarray:
+    """(N, 3) points to (N,) int64, one number a voxel."""
+    cells = np.floor(points / size).astype(np.int64) + KEY_OFFSET
+    return (cells[:, 0] << (2 * KEY_BITS)) | (cells[:, 1] << KEY_BITS) | cells[:, 2]
+
+
+@njit(cache=True)
+def _insert(table, keys):
+    """Open addressing: True for the keys that were not yet in the table, which now holds them."""
+    mask = len(table) - 1
+    new = np.zeros(len(keys), dtype=np.bool_)
+    for i in range(len(keys)):
+        key = keys[i]
+        slot = ((key * np.int64(-7046029254386353131)) >> np.int64(20)) & mask
+        while table[slot] != EMPTY and table[slot] != key:
+            slot = (slot + 1) & mask
+        if table[slot] == EMPTY:
+            table[slot] = key
+            new[i] = True
+    return new
+
+
+def _grown(table: np.ndarray, at_least: int) -> np.ndarray:
+    bigger = np.full(1 << int(np.ceil(np.log2(2 * at_least))), EMPTY)
+    _insert(bigger, table[table != EMPTY])
+    return bigger
