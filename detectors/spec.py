@@ -12,9 +12,9 @@ A path alone is `onnx:` when it ends in .onnx, and `recorded:` when it is a .jso
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple
 
 from ..datasets.errors import UserError
 from ..datasets.sequence import Sequence
@@ -27,8 +27,8 @@ def make_detector(spec: str, sequence: Sequence | None = None) -> Detector:
 
     Args:
         spec: the line.
-        sequence: what it will run on. `simulated` needs it; `recorded` makes sure that its frames belong to a
-            sequence that tells its frames' `names`.
+        sequence: what it will run on. `simulated` needs it; `recorded` makes sure that its frames are the
+            sequence's.
 
     Raises:
         UserError: for an unknown kind of detector or option, or a value that is not of the option's type.
@@ -91,7 +91,7 @@ def _make_recorded(path: str, sequence: Sequence | None, options: dict[str, Any]
     if detector.matched_by is MatchedBy.INDEX and isinstance(sequence, Subset) and sequence.indices.step != 1:
         reason = "its image ids count all frames, but only some are used"
         raise UserError(f"{path}: {reason}; use every frame, or list the images with images=FILE")
-    if isinstance(sequence, _HasNames):
+    if sequence is not None:
         detector.check_against(sequence.names)
     return detector
 
@@ -115,13 +115,6 @@ def _size(text: str) -> tuple[int, int]:
 
 
 _MEANING = {int: "a whole number", float: "a number", _size: "a size such as 640x480"}
-
-
-@runtime_checkable
-class _HasNames(Protocol):
-    """A sequence that knows its frames' names without reading them."""
-
-    names: Iterable[str]
 
 
 class _Kind(NamedTuple):

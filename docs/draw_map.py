@@ -19,6 +19,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+
 from thingmap.datasets.errors import InputError, UserError
 from thingmap.datasets.frame import Intrinsics
 from thingmap.mapper import Thing

@@ -148,7 +148,7 @@ class LifecycleConfig:
 
     merge_gate: float = 16.81  # chi-square, 6 degrees of freedom, 99 %: two positions (joint covariance) and sizes
     merge_log_size: float = 0.35  # log units, boxes of one object differ this much with what of it was visible
-    merge_overlap: float = 0.25  # intersection over the smaller volume that makes two things one
+    merge_overlap: float = 0.15  # intersection over the smaller volume that makes two things one
     merge_every: int = 5  # keyframes
     merge_extent: float = 0.5  # of the mean half axis: a partly seen object's centre is this uncertain
     retire_below: float = 0.02  # existence

@@ -118,6 +118,15 @@ class Scores:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Site:
+    """The Gaussian stand-in for the class mixture on a landmark's size: (3,) mean, (3, 3) information."""
+
+    landmark: int
+    mean: np.ndarray
+    information: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Merge:
     """`absorbed` turned out to be `kept`: its measurements count for `kept` from now on."""
 
@@ -132,9 +141,11 @@ class Retire:
     landmark: int
 
 
-Record = Gauge | Motion | Visual | UpPrior | Up | NewLandmark | DepthCentre | Box | Look | Scores | Merge | Retire
+Record = (
+    Gauge | Motion | Visual | UpPrior | Up | NewLandmark | DepthCentre | Box | Look | Scores | Site | Merge | Retire
+)
 KINDS: tuple[type, ...] = (
-    Gauge, Motion, Visual, UpPrior, Up, NewLandmark, DepthCentre, Box, Look, Scores, Merge, Retire
+    Gauge, Motion, Visual, UpPrior, Up, NewLandmark, DepthCentre, Box, Look, Scores, Site, Merge, Retire
 )  # fmt: skip
 
 

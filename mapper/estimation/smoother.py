@@ -14,9 +14,10 @@ from ...factors.odometry import pose3
 from ..config import SmootherConfig
 from ..map.upright import upright_rotation
 from .beliefs import SizeSite
-from .ledger import Box, DepthCentre, Gauge, Ledger, Merge, Motion, NewLandmark, Record, Retire, UpPrior
+from .ledger import Box, DepthCentre, Gauge, Ledger, Merge, Motion, NewLandmark, Record, Retire, Site, UpPrior
 from .record_factors import UP, FactorContext, record_factors, site_factor
 
+REBUILD_STEPS = 10  # at most, Gauss-Newton steps after a rebuild, until nothing moves by more than the thresholds
 SNAPSHOT_EVERY = 20  # updates between copies of the estimate from which a rebuild starts
 Owner = tuple[str, int]  # ("record", ledger number) or ("site", landmark): whose factors these are
 
@@ -36,6 +37,19 @@ class Smoother:
         self._measurements: dict[int, list[int]] = {}  # live landmark -> numbers of its records
         self._snapshot = gtsam.Values()
         self._reset()
+
+    @classmethod
+    def from_ledger(
+        cls, ledger: Ledger, config: SmootherConfig, intrinsics: Intrinsics, upright_tolerance: float = 0.026
+    ) -> Smoother:
+        """The graph of a saved ledger, solved; its own ledger holds the same records."""
+        smoother = cls(config, intrinsics, upright_tolerance)
+        for record in ledger:
+            smoother._replay(record)
+        if smoother.keyframes:
+            smoother._rebuild()
+            smoother._stand_upright()
+        return smoother
 
     # -- measurements
 
@@ -74,6 +88,7 @@ class Smoother:
     def set_site(self, landmark: int, site: SizeSite) -> None:
         """Replaces the Gaussian stand-in for the class mixture on a landmark's size."""
         self.sites[landmark] = site
+        self.ledger.append(Site(landmark, site.mean, site.information))
         self._drop(("site", landmark))
         self._queue[("site", landmark)] = [site_factor(landmark, site)]
 
@@ -156,8 +171,14 @@ class Smoother:
         self._updates += 1
         if self._updates % SNAPSHOT_EVERY == 0:
             self._snapshot = self._isam.calculateEstimate()
-        if np.arccos(np.clip(self._up() @ self.R_world_upright[:, 2], -1.0, 1.0)) > self._tolerance:
-            self._rebuild()  # volumes stand upright: their factors are made anew when up has moved
+        self._stand_upright()
+
+    def _stand_upright(self) -> None:
+        """Volumes are upright: where up has moved, their factors are made anew, which may move it again a little."""
+        for _ in range(3):
+            if np.arccos(np.clip(self._up() @ self.R_world_upright[:, 2], -1.0, 1.0)) < self._tolerance:
+                return
+            self._rebuild()
 
     def _solve(self, values: gtsam.Values) -> None:
         graph = gtsam.NonlinearFactorGraph()
@@ -184,6 +205,9 @@ class Smoother:
         for landmark in self._measurements:
             self._queue[("site", landmark)] = [site_factor(landmark, self.sites[landmark])]
         self._solve(start)
+        for _ in range(REBUILD_STEPS):
+            if self._isam.update(force_relinearize=True).getVariablesRelinearized() == 0:
+                break
         self._snapshot = self._isam.calculateEstimate()
 
     def _last_good(self) -> gtsam.Values:
@@ -208,6 +232,26 @@ class Smoother:
         return start
 
     # -- bookkeeping
+
+    def _replay(self, record: Record) -> None:
+        """Takes over one record of a saved ledger."""
+        match record:
+            case Merge():
+                return self.merge(record.kept, record.absorbed)
+            case Retire():
+                return self.retire(record.landmark)
+            case Site():
+                return self.set_site(record.landmark, SizeSite(record.mean, record.information))
+            case Gauge():
+                self._values.insert(X(0), pose3(record.T_world_camera))
+                self.keyframes = 1
+            case UpPrior():
+                self._values.insert(UP, gtsam.Unit3(record.direction))
+            case Motion():
+                self.keyframes = record.b + 1
+            case NewLandmark():
+                self._measurements[record.landmark] = []
+        self.add(record)
 
     def _up(self) -> np.ndarray:
         # the wrapper offers no calculateEstimate for one Unit3, and copying all values costs 2 ms at 1000 keyframes

@@ -50,7 +50,8 @@ def from_planes(frame: Frame, up_camera: np.ndarray, config: UpConfig) -> UpMeas
         The mean of the planes' normals weighted by their pixels, or None where no support is in view.
     """
     points = _organised_points(frame)
-    normals = cv2.RgbdNormals.create(*points.shape[:2], cv2.CV_32F, _half_matrix(frame), 5).apply(points)
+    height, width = points.shape[:2]
+    normals = cv2.RgbdNormals.create(height, width, cv2.CV_32F, _half_matrix(frame), 5).apply(points)
     labels, planes = cv2.findPlanes(points, normals)
     if planes is None:
         return None

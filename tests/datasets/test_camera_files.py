@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from thingmap.datasets.camera_files import (
     EXAMPLE_JSON,
     read_camera_json,

@@ -4,6 +4,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+
 from thingmap.datasets.errors import InputError
 from thingmap.datasets.folder import open_folder
 from thingmap.datasets.frame import BrokenFrame, FrameProblem, Intrinsics

@@ -3,6 +3,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+
 from thingmap.datasets.frame import BrokenFrame, FrameProblem, Intrinsics
 from thingmap.datasets.images import DepthUnit, FrameFiles, first_image_size, read_frame_images
 

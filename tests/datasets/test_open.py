@@ -5,6 +5,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+
 from thingmap.datasets.errors import InputError, UserError
 from thingmap.datasets.folder import open_folder
 from thingmap.datasets.open import DATASETS, LOADERS, open_sequence

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
+
 from thingmap.datasets.errors import InputError
 from thingmap.datasets.poses import (
     nearest_rotations,

@@ -6,6 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+
 from thingmap.datasets.box_truth import read_boxes_tsv
 from thingmap.datasets.frame import Frame
 from thingmap.datasets.open import open_sequence

@@ -3,6 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.io import savemat
+
 from thingmap.datasets.box_truth import read_boxes_mat, read_boxes_tsv
 from thingmap.datasets.errors import InputError
 from thingmap.datasets.frame import BrokenFrame, Intrinsics

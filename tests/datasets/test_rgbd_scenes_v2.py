@@ -3,6 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+
 from thingmap.datasets.errors import InputError
 from thingmap.datasets.frame import BrokenFrame, FrameProblem, Intrinsics
 from thingmap.datasets.rgbd_scenes_v2 import find_rgbd_scenes_v2, open_rgbd_scenes_v2

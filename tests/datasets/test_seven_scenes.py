@@ -3,6 +3,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+
 from thingmap.datasets.errors import InputError
 from thingmap.datasets.frame import BrokenFrame, FrameProblem, Intrinsics
 from thingmap.datasets.sequence import Sequence

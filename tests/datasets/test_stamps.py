@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from thingmap.datasets.errors import InputError
 from thingmap.datasets.stamps import associate, nearest, read_specific_force
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from thingmap.datasets.synthetic.clutter import CLUTTER
 from thingmap.datasets.synthetic.mesh import Mesh, box, lathe, rotation_z, tube
 from thingmap.datasets.synthetic.objects import BUILDERS

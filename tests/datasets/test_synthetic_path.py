@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from thingmap.datasets.synthetic.paths import OrbitConfig, hand_held
 
 STAMPS = np.arange(200) / 30.0

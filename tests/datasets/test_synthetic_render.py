@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from thingmap.datasets.frame import Intrinsics
 from thingmap.datasets.synthetic.camera import ColorCamera, develop
 from thingmap.datasets.synthetic.casting import MISS, pixel_rays

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from thingmap.datasets.errors import UserError
 from thingmap.datasets.open import open_sequence
 from thingmap.datasets.sequence import Sequence

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from thingmap.datasets.frame import Intrinsics
 from thingmap.datasets.synthetic.sensor import IDEAL, DepthSensor, measure
 

@@ -2,6 +2,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from thingmap.datasets.errors import InputError
 from thingmap.datasets.tables import read_table
 

@@ -2,6 +2,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from thingmap.datasets.camera_files import EXAMPLE_JSON
 from thingmap.datasets.errors import InputError
 from thingmap.datasets.frame import BrokenFrame, FrameProblem, Intrinsics

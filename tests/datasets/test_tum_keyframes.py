@@ -2,6 +2,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from thingmap.datasets.errors import InputError
 from thingmap.datasets.frame import Intrinsics
 from thingmap.datasets.tum_keyframes import find_tum_keyframes, open_tum_keyframes

@@ -2,6 +2,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+
 from thingmap.datasets.errors import UserError
 from thingmap.datasets.frame import BrokenFrame, Frame, FrameProblem, Intrinsics
 from thingmap.datasets.sequence import Sequence

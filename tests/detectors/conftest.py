@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from thingmap.datasets.frame import Frame, Intrinsics
 from thingmap.detectors.detections import Detections
 

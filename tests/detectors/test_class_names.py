@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+
 from thingmap.datasets.errors import InputError
 from thingmap.detectors.class_names import read_class_names
 from thingmap.detectors.coco import COCO_80, COCO_CATEGORIES, COCO_CATEGORY_IDS

@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+
 from thingmap.detectors.detections import Detections, Part
 
 NAN = float("nan")

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
 from thingmap.detectors.coco import COCO_80
 from thingmap.detectors.detections import Detections
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+
 from thingmap.datasets.errors import InputError, UserError
 from thingmap.datasets.frame import Frame, Intrinsics
 from thingmap.detectors.coco import COCO_80

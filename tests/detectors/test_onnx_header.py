@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from thingmap.datasets.errors import InputError
 from thingmap.detectors.onnx.header import read_header
 

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+
 from thingmap.detectors.onnx.outputs import OutputFamily, decode, family_of
 from thingmap.detectors.onnx.suppression import suppress
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
+
 from thingmap.datasets.errors import InputError, UserError
 from thingmap.detectors.detections import Detections
 from thingmap.detectors.recorded import RecordedDetections, write_detections

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from thingmap.datasets.errors import InputError, UserError
 from thingmap.detectors.coco import COCO_80
 from thingmap.detectors.recorded import RecordedDetections, RecordedFormat

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+
 from thingmap.datasets.errors import InputError
 from thingmap.detectors.detections import Detections
 from thingmap.detectors.recorded import RecordedDetections, write_detections

@@ -6,6 +6,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
+
 from thingmap.datasets.errors import UserError
 from thingmap.datasets.frame import Frame, Intrinsics
 from thingmap.datasets.synthetic.sample import TabletopConfig, TabletopSequence

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from thingmap.datasets.errors import InputError
 from thingmap.mapper.map.object_map import MapFrame, ObjectMap, UpDirection
 from thingmap.mapper.map.store import OutputFolder

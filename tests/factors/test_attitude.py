@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from thingmap.factors.attitude import attitude_factor, up_prior
 
 X, U = gtsam.symbol("x", 0), gtsam.symbol("u", 0)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from thingmap.datasets.frame import Intrinsics
 from thingmap.factors.box_alignment import box_alignment_factor
 from thingmap.factors.guard import position_guard, size_guard

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gtsam
 import numpy as np
 import pytest
+
 from thingmap.factors.odometry import between_factor, gauge_prior, pose3
 from thingmap.factors.robust import HUBER_WIDTH
 

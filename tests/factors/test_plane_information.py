@@ -6,6 +6,7 @@ import gtsam
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
+
 from thingmap.factors.plane_information import (
     NEIGHBOURS,
     RADIUS_M,

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from thingmap.detectors.coco import COCO_80
 from thingmap.factors.size_prior import CORRELATION, FIT_SIGMA, WIDE_SIGMA, load_size_priors, marginal
 from thingmap.factors.size_table import SizeEntry

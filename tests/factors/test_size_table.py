@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+
 from thingmap.datasets.errors import InputError
 from thingmap.factors.size_prior import BUILT_IN
 from thingmap.factors.size_table import plain_name, read_size_table

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gtsam
 import numpy as np
 import pytest
+
 from thingmap.datasets.frame import Intrinsics
 from thingmap.factors.box_alignment import box_alignment_factor
 from thingmap.factors.depth_centre import depth_centre_factor

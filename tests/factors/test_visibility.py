@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+
 from thingmap.datasets.frame import Intrinsics
 from thingmap.detectors.detections import Part
 from thingmap.factors.visibility import Visibility, VolumePart, measure_visibility

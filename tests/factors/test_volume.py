@@ -6,6 +6,7 @@ import gtsam
 import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+
 from thingmap.datasets.frame import Intrinsics
 from thingmap.factors.volume import NEAR_MARGIN_M, project_volume, project_volumes
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from thingmap.datasets.frame import BrokenFrame, Frame, FrameProblem, Intrinsics
 from thingmap.mapper.map.object_map import MapFrame, ObjectMap, UpDirection
 from thingmap.mapper.map.thing import Evidence, Thing

@@ -4,10 +4,11 @@ import subprocess
 import sys
 
 import pytest
+from typer.testing import CliRunner
+
 from thingmap.mapper.cli.main import app
 from thingmap.mapper.map.store import OutputFolder
 from thingmap.mapper.run_report import RunReport
-from typer.testing import CliRunner
 
 
 @pytest.fixture

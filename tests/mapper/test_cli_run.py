@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
+
 from thingmap.datasets.errors import UserError
 from thingmap.datasets.open import SAMPLE_PREFIX, Loader
 from thingmap.detectors.detections import Detections
@@ -17,7 +19,6 @@ from thingmap.mapper.cli.main import app
 from thingmap.mapper.config import MapperConfig, OdometrySource
 from thingmap.mapper.config_file import load_config
 from thingmap.mapper.map.store import OutputFolder
-from typer.testing import CliRunner
 
 
 class World:

@@ -4,12 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
+
 from thingmap.datasets.open import open_sequence
 from thingmap.mapper.cli.main import app
 from thingmap.mapper.config import MapperConfig
 from thingmap.mapper.config_file import load_config
 from thingmap.mapper.map.store import OutputFolder
-from typer.testing import CliRunner
 
 FRAMES, STRIDE = 10, 4
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from thingmap.datasets.errors import InputError
 from thingmap.mapper.config import MapperConfig, OdometrySource
 from thingmap.mapper.config_file import dump_config, load_config

@@ -4,6 +4,7 @@ import json
 import numpy as np
 import pytest
 from plyfile import PlyData
+
 from thingmap.datasets.errors import InputError
 from thingmap.mapper.export import exporter
 from thingmap.mapper.export.colors import class_color

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from thingmap.mapper.map.object_map import MapFrame, UpDirection
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from thingmap.datasets.errors import InputError
 from thingmap.mapper.map.map_file import format_document, from_document, to_document
 from thingmap.mapper.map.object_map import MapFrame, ObjectMap, UpDirection

@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import norm
+
 from thingmap.mapper.map.region import Ball, Box, as_region, probability_inside
 
 UNIT = Box(np.zeros(3), np.ones(3))

@@ -2,6 +2,7 @@ import threading
 import time
 
 import pytest
+
 from thingmap.datasets.errors import UserError
 from thingmap.datasets.frame import BrokenFrame, FrameProblem
 from thingmap.mapper.read_ahead import ReadAhead

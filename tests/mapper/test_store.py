@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from plyfile import PlyData
 from scipy.spatial.transform import Rotation
+
 from thingmap.datasets.errors import InputError, UserError
 from thingmap.mapper.map.atomic import replacing, write_atomic
 from thingmap.mapper.map.store import OutputFolder

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from thingmap.mapper.map.boxes import EDGES, inside_box
 from thingmap.mapper.map.upright import upright_rotation
 
