@@ -63,7 +63,7 @@ class UpConfig:
     """The up direction of the world, a variable of the graph."""
 
     prior_sigma: float = 0.6  # rad, a hand-held camera is roughly upright
-    plane_sigma: float = 0.06  # rad; normals of tables and floors of a hand-held Kinect are off by 1-4 degrees together
+    plane_sigma: float = 0.2  # rad; a room's normals are off by 1-4 degrees together, so each must say little
     accelerometer_sigma: float = 0.08  # rad, hand accelerations of about 0.8 m/s^2
     gravity_sigma: float = 0.01  # rad, a gravity file
     max_tilt: float = 0.6  # rad, planes further than this from the current up are not supports (walls)
@@ -80,6 +80,7 @@ class LiftingConfig:
     central_share: float = 0.5  # of width and height: the part of the box whose depth is read
     min_readings: int = 12  # pixels with depth
     max_range: float = 6.0  # m, beyond it Kinect depth is worse than 10 cm
+    surface_offset: float = 0.5  # of the half depth, from that surface to the centre: 1 for a box, 0 for a flat thing
     border: int = 3  # px: a box side this close to the image border is cut off by it
     sigma_px: float = 2.5  # px, floor of a box side's noise
     sigma_relative: float = 0.06  # of the box's side lengths: noise of a box side grows with the box
@@ -122,8 +123,8 @@ class BeliefConfig:
     view_log_range: float = 0.3  # the same for log distance
     min_weight: float = 0.05  # a repeated view still counts this much
     score_correlation: float = 0.5  # of the score heights of one object's views: at most 2 views' worth
-    steady_confusion: float = 0.1  # objects that look like one of another class from every side
-    size_outlier: float = 0.1  # objects of which only a part is ever measured, such as chairs pushed under a table
+    steady_confusion: float = 0.15  # objects that look like one of another class from every side
+    size_outlier: float = 0.05  # objects of which only a part is ever measured, such as chairs pushed under a table
     site_tolerance: float = 0.05  # symmetric change of a size site below which it is left as it is
 
 

@@ -60,7 +60,7 @@ def lift(detections: Detections, frame: Frame, config: LiftingConfig) -> tuple[l
 def lift_box(xyxy: np.ndarray, scores: np.ndarray, frame: Frame, config: LiftingConfig) -> LiftedDetection | Outcome:
     """One box, (4,) pixels with pixel centres at integers, in space.
 
-    Depth is the median of the box's centre; the object's centre lies about half its depth behind its surface.
+    Depth is the median of the box's centre; the object's centre lies behind that surface by most of its half depth.
 
     The half depth is unknown from one view: the smaller half extent stands in for it, and its share in the range's
     noise says so.
@@ -86,7 +86,7 @@ def lift_box(xyxy: np.ndarray, scores: np.ndarray, frame: Frame, config: Lifting
         xyxy=xyxy,
         sides_seen=seen,
         sigma_px=config.sigma_px + config.sigma_relative * float(np.sqrt(sides.prod())),
-        centre=surface * (1.0 + 0.5 * half_depth / distance),
+        centre=surface * (1.0 + config.surface_offset * half_depth / distance),
         sigma_tangential=max(noise, across * float(np.sqrt(half_width * half_height))),
         sigma_range=float(np.sqrt(noise**2 + spread**2 + (config.sigma_range * half_depth) ** 2)),
         half_extents=np.array([half_width, half_depth, half_height]),

@@ -13,6 +13,7 @@ from ...datasets.frame import BrokenFrame, Frame, FrameProblem
 from ...factors.plane_information import point_to_plane_covariance
 from ..config import OdometryConfig, OdometrySource
 
+DIGITS = 9  # KISS-ICP adds in parallel, so its last bits differ from run to run; a map must not
 MIN_POINTS = 200  # fewer depth readings than this cannot be registered
 
 
@@ -92,15 +93,15 @@ class KissOdometry:
         if len(points) < MIN_POINTS:
             raise BrokenFrame(frame.name, FrameProblem.NO_DEPTH, f"{len(points)} readings in range")
         _, self._source = self._icp.register_frame(points, np.array([]))
-        return self._icp.last_pose.copy()
+        return np.round(self._icp.last_pose, DIGITS)
 
     def keyframe(self) -> OdometryStep | None:
-        T = self._icp.last_pose.copy()
+        T = np.round(self._icp.last_pose, DIGITS)
         covariance = np.zeros((6, 6))
         if self._map_points is not None:
             # two scans were matched to the same map
             covariance = 2.0 * point_to_plane_covariance(self._source, T, self._map_points).covariance()
-        self._map_points = self._icp.local_map.point_cloud()
+        self._map_points = np.round(self._icp.local_map.point_cloud(), DIGITS)
         return self._keyframes.step(T, covariance)
 
     def _points(self, frame: Frame) -> np.ndarray:
