@@ -96,8 +96,8 @@ class VisualOdometry:
         rng = np.random.default_rng(self._seed)
         triples = rng.integers(0, len(source), (SAMPLES, 3))
         motions = rigid_motion(source[triples], target[triples], np.ones((SAMPLES, 3)))
-        moved = np.einsum("sij,nj->sni", motions[:, :3, :3], source) + motions[:, None, :3, 3]
-        agree = np.linalg.norm(moved - target, axis=2) < self._tolerance(target)
+        apart = motions[:, :3, :3] @ source.T + motions[:, :3, 3:] - target.T  # (SAMPLES, 3, M)
+        agree = (apart**2).sum(axis=1) < self._tolerance(target) ** 2
         return agree[int(np.argmax(agree.sum(axis=1)))]
 
     def _agree(self, T: np.ndarray, source: np.ndarray, target: np.ndarray) -> np.ndarray:
