@@ -114,13 +114,13 @@ class SemanticMapper:
         with stage("factors"):
             touched = observer.observe(view, lifted, assignment, targets, visibility)
             lifecycle.start_tracks(view, lifted, scores, assignment)
-            touched |= lifecycle.promote_and_drop()
+            promoted = lifecycle.promote_and_drop()
         with stage("smoothing"):
             smoother.update()
         with stage("beliefs"):
-            lifecycle.refresh(touched)
+            lifecycle.refresh(touched | promoted)
         with stage("lifecycle"):
-            if view.keyframe % config.lifecycle.merge_every == 0:
+            if promoted or view.keyframe % config.lifecycle.merge_every == 0:
                 lifecycle.merge()
             lifecycle.retire()
 

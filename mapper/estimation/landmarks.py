@@ -53,9 +53,11 @@ class Landmark:
         self.measurements += other.measurements
 
 
-def volume_overlap(a: Landmark, b: Landmark, R_world_upright: np.ndarray) -> float:
-    """Intersection of two upright boxes over the smaller one's volume."""
-    offset = np.abs(R_world_upright.T @ (a.position - b.position))
-    reach = np.minimum(a.half_axes + b.half_axes - offset, 2.0 * np.minimum(a.half_axes, b.half_axes))
-    smaller = min(float(np.prod(2.0 * a.half_axes)), float(np.prod(2.0 * b.half_axes)))
-    return float(np.prod(np.maximum(reach, 0.0))) / smaller
+def volume_overlaps(landmarks: list[Landmark], R_world_upright: np.ndarray) -> np.ndarray:
+    """(N, N) intersection of every two upright boxes over the smaller one's volume."""
+    centres = np.array([x.position for x in landmarks]).reshape(-1, 3) @ R_world_upright
+    half = np.array([x.half_axes for x in landmarks]).reshape(-1, 3)
+    offset = np.abs(centres[:, None] - centres[None])
+    reach = np.minimum(half[:, None] + half[None] - offset, 2.0 * np.minimum(half[:, None], half[None]))
+    volume = np.prod(2.0 * half, axis=1)
+    return np.prod(np.maximum(reach, 0.0), axis=2) / np.minimum(volume[:, None], volume[None])

@@ -13,7 +13,7 @@ from ..config import BeliefConfig, LifecycleConfig, TrackConfig
 from .association import Assignment
 from .beliefs import Belief, initial_site, propagate
 from .evidence import Observer
-from .landmarks import Landmark, volume_overlap
+from .landmarks import Landmark, volume_overlaps
 from .ledger import Look, Scores
 from .lifting import LiftedDetection
 from .outcomes import Outcome
@@ -132,20 +132,20 @@ class Lifecycle:
     def merge(self) -> None:
         """Landmarks whose volumes overlap and whose positions agree under their joint covariance are one thing."""
         landmarks = sorted(self._scene.landmarks.values(), key=lambda landmark: landmark.number)
+        overlaps = volume_overlaps(landmarks, self._smoother.R_world_upright)
         gone: set[int] = set()
-        for i, kept in enumerate(landmarks):
-            for other in landmarks[i + 1 :]:
-                if kept.number not in gone and other.number not in gone and self._are_one(kept, other):
-                    self._smoother.merge(kept.number, other.number)
-                    kept.count_from(other)
-                    del self._scene.landmarks[other.number]
-                    gone.add(other.number)
-                    self._outcomes[Outcome.MERGED] += 1
+        for i, j in np.argwhere(np.triu(overlaps > self._config.merge_overlap, k=1)):
+            kept, other = landmarks[i], landmarks[j]
+            if kept.number in gone or other.number in gone or not self._are_one(kept, other):
+                continue
+            self._smoother.merge(kept.number, other.number)
+            kept.count_from(other)
+            kept.belief.update()
+            del self._scene.landmarks[other.number]
+            gone.add(other.number)
+            self._outcomes[Outcome.MERGED] += 1
 
     def _are_one(self, a: Landmark, b: Landmark) -> bool:
-        overlap = volume_overlap(a, b, self._smoother.R_world_upright)
-        if overlap < self._config.merge_overlap:
-            return False
         extent = self._config.merge_extent * min(float(np.mean(a.half_axes)), float(np.mean(b.half_axes)))
         covariance = self._smoother.difference_covariance(a.number, b.number) + extent**2 * np.eye(3)
         apart = a.position - b.position
