@@ -1,8 +1,12 @@
 """Evidence from seeing through a volume (Meger et al., Clutter, section III-C).
 
 The free ratio of a view is the share of the volume's unoccluded pixels whose depth lies behind it. For an object it is
-near zero up to sensor error and the volume's misfit (half-normal, as in the paper); where there is none, the box may
-still lie on some surface, so its density is a mixture of the object's and a uniform one.
+near zero up to sensor error and the volume's misfit (half-normal, as in the paper). Where there is no object, the
+volume is either as empty as chance has it (uniform) or, from every side alike, filled by some surface that looks like
+an object to the depth camera. Which of the two is one fact about the place and not one a view, so a surface speaks for
+an object only once:
+
+    S = Σ_t w_t log N+(free_t; 0, σ),   evidence = S - log(u + (1 - u) e^S)  <=  -log(1 - u)
 """
 
 from __future__ import annotations
@@ -18,16 +22,19 @@ class FreeSpace:
 
     Attributes:
         sigma: half-normal scale for objects; 0.3 because an ellipsoid is not the object: handles, slats and corners.
-        uniform: share of the uniform part where there is no object.
-        max_ratio: bound on one view's evidence, nats.
+        uniform: u, share of places without an object that are empty.
+        bound: one view says at most this, nats.
     """
 
     sigma: float = 0.3
     uniform: float = 0.5
-    max_ratio: float = 3.0
+    bound: float = 3.0
 
-    def log_ratio(self, free: np.ndarray) -> np.ndarray:
-        """(N,) free ratios in [0, 1] to (N,) nats for being an object."""
-        there = np.exp(-0.5 * (free / self.sigma) ** 2) * np.sqrt(2.0 / np.pi) / self.sigma
-        none = self.uniform + (1.0 - self.uniform) * there
-        return np.clip(np.log(there + 1e-9) - np.log(none), -self.max_ratio, self.max_ratio)
+    def log_likelihood(self, free: np.ndarray) -> np.ndarray:
+        """(N,) free ratios in [0, 1] of one view to (N,) log densities if there is an object, nats."""
+        density = np.log(np.sqrt(2.0 / np.pi) / self.sigma) - 0.5 * (free / self.sigma) ** 2
+        return np.maximum(density, -self.bound)
+
+    def evidence(self, total: float) -> float:
+        """Nats for being an object, from the weighted sum of its views' log likelihoods."""
+        return float(total - np.logaddexp(np.log(self.uniform), np.log1p(-self.uniform) + total))

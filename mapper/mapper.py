@@ -90,7 +90,7 @@ class SemanticMapper:
         with self._clock.stage("odometry"):
             is_keyframe = self._camera.track(frame)
         if is_keyframe:
-            with self._clock.stage("up"):
+            with self._clock.stage("keyframe"):
                 view = self._camera.add_keyframe(frame)
             with self._clock.stage("detection"):
                 lifted = self._detect(frame, detections)
@@ -132,6 +132,7 @@ class SemanticMapper:
             for landmark in landmarks:
                 self._lifecycle.refresh_fully(landmark)
             self._camera.smoother.settle()
+            self._lifecycle.refresh(set())
         if include_doubtful:
             landmarks += self._scene.retired.values()
         things = compose_things(landmarks, self._classes or (), 0.0 if include_doubtful else PROBABLE)
@@ -196,7 +197,7 @@ class SemanticMapper:
         self._observer = Observer(self._scene, smoother, self._models, self._outcomes)
         configs = config.tracks, config.beliefs, config.lifecycle
         self._lifecycle = Lifecycle(
-            self._scene, smoother, self._observer, priors, self._models.rate, configs, self._outcomes
+            self._scene, smoother, self._observer, priors, self._models, configs, self._outcomes
         )
 
     def _count_things(self) -> int:

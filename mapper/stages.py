@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -10,10 +11,10 @@ import numpy as np
 
 
 class StageClock:
-    """Milliseconds per stage; keeps every reading as a float32, 4 bytes a keyframe."""
+    """Milliseconds per stage; keeps every reading, 4 bytes each."""
 
     def __init__(self) -> None:
-        self._readings: dict[str, list[np.float32]] = {}
+        self._readings: dict[str, array[float]] = {}
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -22,7 +23,7 @@ class StageClock:
         try:
             yield
         finally:
-            self._readings.setdefault(name, []).append(np.float32(1e3 * (time.perf_counter() - start)))
+            self._readings.setdefault(name, array("f")).append(1e3 * (time.perf_counter() - start))
 
     def summary(self) -> dict[str, dict[str, float]]:
         """Per stage: count, median_ms, p95_ms, total_s."""

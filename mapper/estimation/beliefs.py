@@ -13,9 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
 
 from ...factors.appearance import ScoreEvidence
+from ...factors.free_space import FreeSpace
 from ...factors.missed import DetectionRate
 from ...factors.size_prior import ClassSizePriors
 from ..config import BeliefConfig
@@ -88,10 +88,24 @@ def propagate(
     weights = posterior * (1.0 - share)
     weights[0] += posterior @ share
     mixed_mean, mixed_covariance = _moments(weights, means, covariances)
-    new = _positive(np.linalg.inv(mixed_covariance) - cavity, MIN_INFORMATION)
-    # keep the mixture's mean even where the information had to be clamped
-    new_vector = (cavity + new) @ mixed_mean - vector
-    return Refreshed(posterior, log_z, SizeSite(np.linalg.solve(new, new_vector), new), mixed_mean, mixed_covariance)
+    site = _divide(mixed_mean, mixed_covariance, cavity, vector)
+    return Refreshed(posterior, log_z, site, mixed_mean, mixed_covariance)
+
+
+def _divide(mean: np.ndarray, covariance: np.ndarray, cavity: np.ndarray, vector: np.ndarray) -> SizeSite:
+    """The Gaussian that turns the cavity (information, information vector) into the given moments.
+
+    Where the moments are wider than the cavity no such Gaussian exists: in those directions the site is next to
+    nothing, centred on the mean. (Keeping the mean exactly would take a site of little information infinitely far away,
+    which pulls for ever.)
+    """
+    target = np.linalg.inv(covariance)
+    values, axes = np.linalg.eigh((target - cavity + (target - cavity).T) / 2.0)
+    along = axes.T @ (target @ mean - vector)
+    clamped = values < MIN_INFORMATION
+    values = np.where(clamped, MIN_INFORMATION, values)
+    along = np.where(clamped, MIN_INFORMATION * (axes.T @ mean), along)
+    return SizeSite(axes @ (along / values), (axes * values) @ axes.T)
 
 
 class ViewHistory:
@@ -125,8 +139,8 @@ class ViewHistory:
 class Belief:
     """Everything but geometry that is known about one landmark."""
 
-    def __init__(self, classes: int, config: BeliefConfig, rate: DetectionRate) -> None:
-        self._config, self._rate = config, rate
+    def __init__(self, classes: int, config: BeliefConfig, rate: DetectionRate, free_space: FreeSpace) -> None:
+        self._config, self._rate, self._free_space = config, rate, free_space
         self.views = ViewHistory(config)
         self.own = np.zeros(classes)
         self.excess = np.zeros(classes)  # of "only looks like class k" over "is of class k"
@@ -142,7 +156,7 @@ class Belief:
         self.score_views += weight
 
     def add_view(self, hits: float, misses: float, free: float) -> None:
-        """Weighted hits and misses, and the free-space log ratio of a view."""
+        """Weighted hits and misses, and the weighted log likelihood of a view's free ratio."""
         self.hits += hits
         self.misses += misses
         self.free += free
@@ -173,8 +187,8 @@ class Belief:
         looks_like = self.own + shrink * self.excess
         others = _log_sum_of_others(looks_like) - np.log(max(count - 1, 1))
         named = np.logaddexp(np.log1p(-c.steady_confusion) + self.own, np.log(c.steady_confusion) + others)
-        existence = self._rate.log_ratio(self.hits, self.misses) + self.free
-        null = np.log(c.null_prior) + logsumexp(looks_like) - np.log(count)
+        existence = self._rate.log_ratio(self.hits, self.misses) + self._free_space.evidence(self.free)
+        null = np.log(c.null_prior) + _log_sum(looks_like) - np.log(count)
         return np.append(null, np.log1p(-c.null_prior) - np.log(count) + named + existence)
 
     def update(self, log_z: np.ndarray | None = None) -> None:
@@ -220,12 +234,21 @@ def _moments(weights: np.ndarray, means: np.ndarray, covariances: np.ndarray) ->
 
 
 def _log_sum_of_others(x: np.ndarray) -> np.ndarray:
-    """(K,) log Σ_{m≠k} exp(x_m), without the cancellation of subtracting from the whole sum."""
+    """(K,) log Σ_{m≠k} exp(x_m): the whole sum less one term, but for the largest, where that would cancel."""
     if len(x) < 2:
         return np.full(len(x), -np.inf)
-    spread = np.broadcast_to(x, (len(x), len(x))).copy()
-    np.fill_diagonal(spread, -np.inf)
-    return logsumexp(spread, axis=1)
+    largest = int(np.argmax(x))
+    e = np.exp(x - x[largest])
+    rest = np.delete(x, largest)
+    others = x[largest] + np.log(np.maximum(e.sum() - e, np.finfo(float).tiny))
+    others[largest] = rest.max() + np.log(np.exp(rest - rest.max()).sum())
+    return others
+
+
+def _log_sum(x: np.ndarray) -> float:
+    """log Σ exp(x_k); scipy's costs a hundred times more on small arrays."""
+    largest = float(x.max())
+    return largest + float(np.log(np.exp(x - largest).sum()))
 
 
 def _positive(matrix: np.ndarray, floor: float) -> np.ndarray:

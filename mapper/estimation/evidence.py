@@ -73,7 +73,7 @@ class Observer:
         expected = self._models.rate.expected(targets.visible, targets.side_px) * known
         seen = visibility.agreeing[:, WHOLE] + visibility.free[:, WHOLE]
         free = np.divide(visibility.free[:, WHOLE], seen, out=np.zeros(len(seen)), where=seen > 0)
-        free_ratio = self._models.free_space.log_ratio(free) * seen * known * visibility.in_image[:, WHOLE]
+        free_look = self._models.free_space.log_likelihood(free) * seen * known * visibility.in_image[:, WHOLE]
         touched = set()
         for m, member in enumerate(self._scene.members()):
             own = np.flatnonzero(assignment.target == m)
@@ -82,7 +82,7 @@ class Observer:
                 self._count_unseen(member, view.keyframe, visibility.in_image[m, WHOLE])
                 continue
             weight = member.belief.views.weight(view.T_world_camera[:3, 3] - member.position)
-            look = (weight * hit, weight * (not hit) * expected[m], weight * free_ratio[m])
+            look = (weight * hit, weight * (not hit) * expected[m], weight * free_look[m])
             member.belief.add_view(*look)
             if len(own):
                 self._detected(member, view, detections[own[0]], float(targets.visible[m]), weight)

@@ -97,7 +97,7 @@ class Box:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """What one keyframe said about a landmark: weighted hits and misses, free-space log ratio (nats)."""
+    """What one keyframe said about a landmark: weighted hits, misses and log likelihood of the free ratio (nats)."""
 
     keyframe: int
     landmark: int

@@ -178,6 +178,9 @@ class Smoother:
         for _ in range(3):
             if np.arccos(np.clip(self._up() @ self.R_world_upright[:, 2], -1.0, 1.0)) < self._tolerance:
                 return
+            if not self._measurements:
+                self.R_world_upright = upright_rotation(self._up())
+                return
             self._rebuild()
 
     def _solve(self, values: gtsam.Values) -> None:

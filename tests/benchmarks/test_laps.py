@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import pytest
 from laps import BackAndForth
 from memory import deep_size, resident_mb
 
@@ -67,7 +68,7 @@ def test_deep_size_counts_the_array_behind_a_view() -> None:
 def test_resident_memory_grows_with_what_is_held() -> None:
     before = resident_mb()
     if before is None:
-        return  # the system does not tell
+        pytest.skip("this system does not tell a process's memory")
     held = np.ones(10_000_000)
     after = resident_mb()
     assert after is not None

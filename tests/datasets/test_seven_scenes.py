@@ -7,7 +7,7 @@ import pytest
 from thingmap.datasets.errors import InputError
 from thingmap.datasets.frame import BrokenFrame, FrameProblem, Intrinsics
 from thingmap.datasets.sequence import Sequence
-from thingmap.datasets.seven_scenes import find_seven_scenes, open_seven_scenes
+from thingmap.datasets.seven_scenes import KINECT, REGISTRATION, find_seven_scenes, open_seven_scenes
 
 MATRIX = "60 0 31.5\n0 60 23.5\n0 0 1\n"
 
@@ -55,13 +55,55 @@ def test_the_jpeg_form_with_gravity(tmp_path: Path, write_images, pose) -> None:
     assert np.abs(sequence[0].color.astype(int) - rgb).mean() < 12  # JPEG is lossy; swapped channels are off by 80
 
 
-def test_without_a_camera_file_it_is_the_kinect(tmp_path: Path, write_images) -> None:
-    stem = tmp_path / "chess" / "seq-01" / "frame-000000"
-    write_images(stem.with_suffix(".color.png"), stem.with_suffix(".depth.png"), size=(640, 480))
-    sequence = open_seven_scenes(tmp_path / "chess" / "seq-01")
-    assert sequence.intrinsics == Intrinsics(640, 480, 585, 585, 320, 240)
+def write_kinect(folder: Path, write_images) -> tuple[np.ndarray, np.ndarray]:
+    stem = folder / "frame-000000"
+    return write_images(stem.with_suffix(".color.png"), stem.with_suffix(".depth.png"), size=(640, 480))
+
+
+@pytest.mark.parametrize("camera", [None, "585 0 320\n0 585 240\n0 0 1\n"])
+def test_the_kinect_s_depth_is_registered_to_its_colour(tmp_path: Path, write_images, camera: str | None) -> None:
+    folder = tmp_path / "chess" / "seq-01"
+    rgb, raw = write_kinect(folder, write_images)
+    if camera is not None:
+        (folder / "camera-intrinsics.txt").write_text(camera)
+    sequence = open_seven_scenes(folder)
     assert sequence.name == "chess-seq-01"
     assert sequence.poses is None and sequence[0].T_world_camera is None
+    assert sequence.intrinsics == REGISTRATION.color != KINECT
+    frame = sequence[0]
+    assert frame.intrinsics == sequence.intrinsics
+    np.testing.assert_array_equal(frame.color, rgb)
+    np.testing.assert_allclose(frame.depth, REGISTRATION.register((raw / 1000).astype(np.float32)), rtol=1e-6)
+
+
+def test_the_kinect_s_poses_become_those_of_its_colour_camera(tmp_path: Path, write_images, pose) -> None:
+    write_kinect(tmp_path / "k", write_images)
+    np.savetxt(tmp_path / "k" / "frame-000000.pose.txt", pose(3))
+    sequence = open_seven_scenes(tmp_path / "k")
+    p_depth = np.array([0.2, -0.1, 1.5, 1.0])  # a point in the depth camera, whose poses the files give
+    p_color = p_depth + np.array([*REGISTRATION.offset, 0.0])
+    for T in (sequence.poses[0], sequence[0].T_world_camera):
+        np.testing.assert_allclose(T @ p_color, pose(3) @ p_depth, atol=1e-9)
+
+
+def test_another_camera_s_images_are_taken_as_registered(tmp_path: Path, write_images, pose) -> None:
+    _, raw = write_kinect(tmp_path / "k", write_images)
+    np.savetxt(tmp_path / "k" / "frame-000000.pose.txt", pose(3))
+    (tmp_path / "k" / "camera-intrinsics.txt").write_text("525 0 319.5\n0 525 239.5\n0 0 1\n")
+    sequence = open_seven_scenes(tmp_path / "k")
+    assert sequence.registration is None and sequence.intrinsics.fx == 525
+    np.testing.assert_allclose(sequence[0].depth, raw / 1000, rtol=1e-6)
+    np.testing.assert_allclose(sequence.poses[0], pose(3), atol=1e-12)
+
+
+def test_a_missing_pose_stays_missing_when_poses_are_moved(tmp_path: Path, write_images, pose) -> None:
+    write_kinect(tmp_path / "k", write_images)
+    write_images(tmp_path / "k" / "frame-000001.color.png", tmp_path / "k" / "frame-000001.depth.png", size=(640, 480))
+    np.savetxt(tmp_path / "k" / "frame-000000.pose.txt", pose(3))
+    sequence = open_seven_scenes(tmp_path / "k")
+    assert np.isfinite(sequence.poses[0]).all() and np.isnan(sequence.poses[1]).all()
+    with pytest.raises(BrokenFrame, match="no pose file"):
+        sequence[1]
 
 
 def test_another_camera_needs_its_file(kitchen: Path) -> None:
