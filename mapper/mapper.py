@@ -90,11 +90,12 @@ class SemanticMapper:
         with self._clock.stage("odometry"):
             is_keyframe = self._camera.track(frame)
         if is_keyframe:
+            # before the graph changes: whatever a detector raises, the map stays whole
+            with self._clock.stage("detection"):
+                found = self._detect(frame, detections)
             with self._clock.stage("keyframe"):
                 view = self._camera.add_keyframe(frame)
-            with self._clock.stage("detection"):
-                lifted = self._detect(frame, detections)
-            self._map(view, lifted)
+            self._map(view, self._lift(found, frame))
             with self._clock.stage("cloud"):
                 self._cloud.add(frame, view.keyframe, self._camera.smoother.pose(view.keyframe))
         return MapUpdate(frame.index, is_keyframe, self._camera.pose(), self._count_things())
@@ -173,19 +174,22 @@ class SemanticMapper:
             k = self._camera.intrinsics
             self._camera.smoother.ledger.save(path, {"intrinsics": asdict(k), "classes": list(self._classes or ())})
 
-    def _detect(self, frame: Frame, detections: Detections | None) -> list[LiftedDetection]:
+    def _detect(self, frame: Frame, detections: Detections | None) -> Detections:
         if detections is None:
             if self._detector is None:
                 raise UserError("no detections: give the mapper a detector, or process_frame the frame's detections")
             detections = self._detector(frame)
-        if self._classes is None:
-            self._classes = tuple(detections.classes)
-            self._start_back_end(self._classes)
-        elif tuple(detections.classes) != self._classes:
+        if self._classes is not None and tuple(detections.classes) != self._classes:
             raise UserError(
                 f"frame {frame.name}: expected detections over the same {len(self._classes)} classes as before, found "
                 f"{len(detections.classes)} classes; use one detector for a map"
             )
+        return detections
+
+    def _lift(self, detections: Detections, frame: Frame) -> list[LiftedDetection]:
+        if self._classes is None:
+            self._classes = tuple(detections.classes)
+            self._start_back_end(self._classes)
         lifted, refused = lift(detections, frame, self.config.lifting)
         self._outcomes.update(refused)
         return lifted

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from ..map.text import probability_text
+
 if TYPE_CHECKING:
     from ..map.object_map import Answer
     from ..map.thing import Thing
@@ -32,7 +34,7 @@ def print_answers(answers: Sequence[Answer]) -> None:
     rows = []
     for answer in answers:
         distance = (f"{answer.distance:.3f} ± {answer.distance_std:.3f}",) if with_distance else ()
-        rows.append((_probability(answer.probability), *distance, *_thing_cells(answer.thing)))
+        rows.append((probability_text(answer.probability), *distance, *_thing_cells(answer.thing)))
     _print_table(headers, rows)
 
 
@@ -41,12 +43,8 @@ def _thing_cells(thing: Thing) -> tuple[str, ...]:
     size = "  ".join(f"{extent:.3f}" for extent in thing.size)
     seen = thing.evidence
     counts = f"{seen.supporting}/{seen.occluded}/{seen.contradicting}"
-    return thing.label, _probability(thing.probability), _probability(thing.existence), position, size, counts, thing.id
-
-
-def _probability(p: float) -> str:
-    """Two digits, and never a certainty that is not there."""
-    return ">0.99" if 0.99 < p < 1.0 else "<0.01" if 0.0 < p < 0.01 else f"{p:.2f}"
+    known = probability_text(thing.probability), probability_text(thing.existence)
+    return thing.label, *known, position, size, counts, thing.id
 
 
 def _print_table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
