@@ -1,0 +1,1 @@
+"""A finished map as a picture, with nothing but numpy and OpenCV."""
