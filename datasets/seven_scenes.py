@@ -6,9 +6,9 @@
 
 Depth is in millimetres; 0 and 65535 mean "no reading". Poses are 4x4, depth camera to world.
 
-Colour and depth are those of the Kinect's two cameras, not registered: the same point is up to 30 pixels apart. The
-loader registers depth to colour, so that detections on the colour images meet the right depth; frames, and their
-poses, are the colour camera's.
+Colour and depth are those of the Kinect's two cameras, not registered: the same point is up to 30 pixels apart. Unless
+another camera matrix than the depth camera's is given, the loader registers depth to colour, so that detections on the
+colour images meet the right depth; frames, and their poses, are then the colour camera's.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """How likely a detector's score vector is, given the class and how much of the object was occluded.
 
 Meger et al., Mobile 3D Object Detection in Clutter, sections III-D and IV: the score of the object's own class is
-Gaussian with a mean that falls as occlusion grows, given in bins of width 0.1 with linear interpolation between
-their centres; above an occlusion of 0.7 the detector is expected to respond as if no object were there.
+Gaussian with a mean that falls as occlusion grows; above an occlusion of 0.7 the detector is expected to respond as if
+no object were there. The paper learns a Gaussian for every tenth of occlusion and interpolates; these defaults, which
+know no detector in particular, are one line. Scores are bounded, so the Gaussians are cut off at 0 and 1.
 """
 
 from __future__ import annotations
@@ -10,10 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtr
 
-BIN_WIDTH = 0.1  # of the occlusion ratio (section IV)
 TRUNCATION = 0.7  # occlusion above which the object counts as fully occluded (section IV)
-_BINS = (np.arange(10) + 0.5) * BIN_WIDTH
 _GRID = np.linspace(0.0, 1.0, 101)  # scores, where a density is integrated
 _FLOOR = 1e-6  # of a density, so that its logarithm stays finite
 
@@ -37,7 +37,7 @@ class AppearanceModel:
 
     The defaults are wide ones for detectors with sigmoid scores: a visible object of an indoor class scores about 0.5
     with YOLO-family detectors of 1 to 10 M parameters, and false boxes above a confidence threshold of 0.08 mostly
-    stay below 0.3. A model learned for the detector at hand replaces them.
+    stay below 0.3. The configuration overrides them (`evidence: appearance:`).
 
     Attributes:
         mean_visible, mean_occluded: own-class mean score at occlusion 0 and 0.7, linear between.
@@ -56,9 +56,8 @@ class AppearanceModel:
     confusion: float = 0.15
 
     def own_parameters(self, occlusion: float) -> tuple[float, float]:
-        """Mean and standard deviation of the own-class score at this occlusion ratio, interpolated between bins."""
-        means = self.mean_visible + (self.mean_occluded - self.mean_visible) * np.minimum(_BINS / TRUNCATION, 1.0)
-        return float(np.interp(occlusion, _BINS, means)), self.sigma
+        """Mean and standard deviation of the own-class score at this occlusion ratio."""
+        return float(np.interp(occlusion, [0.0, TRUNCATION], [self.mean_visible, self.mean_occluded])), self.sigma
 
     def evidence(self, scores: np.ndarray, occlusion: float) -> ScoreEvidence:
         """Evidence of one score vector.
@@ -85,16 +84,24 @@ class AppearanceModel:
         return ScoreEvidence(np.log(own / other), np.log(background / other))
 
     def _own(self, s: np.ndarray, mean: float, sigma: float) -> np.ndarray:
-        named = np.exp(-0.5 * ((s - mean) / sigma) ** 2) / (sigma * np.sqrt(2.0 * np.pi))
-        return (1.0 - self.confusion) * named + self.confusion * _half_normal(s, self.other_sigma) + _FLOOR
+        return (
+            (1.0 - self.confusion) * _cut_normal(s, mean, sigma)
+            + self.confusion * _half_normal(s, self.other_sigma)
+            + _FLOOR
+        )
 
     def _background(self, s: np.ndarray) -> np.ndarray:
-        sigma = self.background_sigma
-        return np.exp(-0.5 * ((s - self.background_mean) / sigma) ** 2) / (sigma * np.sqrt(2.0 * np.pi)) + _FLOOR
+        return _cut_normal(s, self.background_mean, self.background_sigma) + _FLOOR
 
     def _other(self, s: np.ndarray, classes: int) -> np.ndarray:
         named_by_mistake = self.confusion / max(classes - 1, 1)
         return (1.0 - named_by_mistake) * _half_normal(s, self.other_sigma) + named_by_mistake
+
+
+def _cut_normal(x: np.ndarray, mean: float, sigma: float) -> np.ndarray:
+    """Density of a Gaussian on [0, 1]."""
+    inside = ndtr((1.0 - mean) / sigma) - ndtr(-mean / sigma)
+    return np.exp(-0.5 * ((x - mean) / sigma) ** 2) / (sigma * np.sqrt(2.0 * np.pi) * inside)
 
 
 def _half_normal(x: np.ndarray, sigma: float) -> np.ndarray:

@@ -1,6 +1,7 @@
 """Evidence from seeing through a volume (Meger et al., Clutter, section III-C).
 
-The free ratio of a view is the share of the volume's unoccluded pixels whose depth lies behind it. For an object it is
+The free ratio of a view is the share of the volume's pixels whose depth lies behind it, among those that are not
+occluded (Explicit Occlusion, section 2.2: what is occluded says nothing). For an object it is
 near zero up to sensor error and the volume's misfit (half-normal, as in the paper). Where there is no object, the
 volume is either as empty as chance has it (uniform) or, from every side alike, filled by some surface that looks like
 an object to the depth camera. Which of the two is one fact about the place and not one a view, so a surface speaks for

@@ -25,7 +25,7 @@ class DetectionRate:
     """Beta priors of the detection rate, and how it falls with visibility and size.
 
     Attributes:
-        object_prior: (a, b) for objects; mean 0.67, three quarters of the mass above 0.5.
+        object_prior: (a, b) for objects; mean 0.67, four fifths of the mass above 0.5.
         none_prior: (a, b) for things that are no object; mean 0.17: false boxes come and go between views.
         min_visible: visible share below which a detector is not expected to respond (0.3; Meger et al., Clutter, IV).
         min_pixels: px; side of the projected box below which detectors respond unreliably.

@@ -8,6 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
+from ..factors.appearance import AppearanceModel
+from ..factors.free_space import FreeSpace
+from ..factors.missed import DetectionRate
+
 
 class OdometrySource(Enum):
     """Where the relative motion between keyframes comes from."""
@@ -66,7 +70,7 @@ class UpConfig:
     plane_sigma: float = 0.2  # rad; a room's normals are off by 1-4 degrees together, so each must say little
     accelerometer_sigma: float = 0.08  # rad, hand accelerations of about 0.8 m/s^2
     gravity_sigma: float = 0.01  # rad, a gravity file
-    max_tilt: float = 0.6  # rad, planes further than this from the current up are not supports (walls)
+    max_tilt: float = 0.8  # rad, planes further than this from the current up are not supports (walls)
     min_plane_share: float = 0.06  # of the valid pixels
     every: int = 2  # keyframes between plane searches (9 ms each)
     upright_tolerance: float = 0.026  # rad (1.5 degrees): volumes are turned when up has moved further
@@ -129,6 +133,15 @@ class BeliefConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class EvidenceModels:
+    """The likelihoods outside the graph; each says where its numbers come from."""
+
+    appearance: AppearanceModel = field(default_factory=AppearanceModel)
+    rate: DetectionRate = field(default_factory=DetectionRate)
+    free_space: FreeSpace = field(default_factory=FreeSpace)
+
+
+@dataclass(frozen=True, slots=True)
 class SmootherConfig:
     """ISAM2; thresholds measured with 1000 keyframes and 100 objects (benchmarks/throughput.py)."""
 
@@ -179,6 +192,7 @@ class MapperConfig:
     association: AssociationConfig = field(default_factory=AssociationConfig)
     tracks: TrackConfig = field(default_factory=TrackConfig)
     beliefs: BeliefConfig = field(default_factory=BeliefConfig)
+    evidence: EvidenceModels = field(default_factory=EvidenceModels)
     smoother: SmootherConfig = field(default_factory=SmootherConfig)
     lifecycle: LifecycleConfig = field(default_factory=LifecycleConfig)
     cloud: CloudConfig = field(default_factory=CloudConfig)

@@ -16,7 +16,7 @@ from ..detectors.detector import Detector
 from ..factors.size_prior import load_size_priors
 from .config import MapperConfig
 from .estimation.association import associate
-from .estimation.evidence import EvidenceModels, Observer, class_evidence, score_evidence
+from .estimation.evidence import Observer, class_evidence, score_evidence
 from .estimation.lifecycle import Lifecycle
 from .estimation.lifting import LiftedDetection, lift
 from .estimation.outcomes import Outcome
@@ -66,7 +66,7 @@ class SemanticMapper:
     ) -> None:
         self.config = config or MapperConfig()
         self._detector, self._source = detector, source
-        self._models = EvidenceModels()
+        self._models = self.config.evidence
         self._camera = CameraGraph(self.config, gravity)
         self._cloud = KeyframeCloud(self.config.cloud)
         self._scene = Scene()

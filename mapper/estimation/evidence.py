@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import logsumexp
 
-from ...factors.appearance import TRUNCATION, AppearanceModel, ScoreEvidence
-from ...factors.free_space import FreeSpace
-from ...factors.missed import DetectionRate
+from ...factors.appearance import AppearanceModel, ScoreEvidence
 from ...factors.visibility import Visibility
+from ..config import EvidenceModels
 from .association import Assignment, Targets
 from .landmarks import Landmark
 from .ledger import Box, DepthCentre, Look, Scores
@@ -26,15 +24,6 @@ EXPECTED = 0.5  # expected detection rate above which not being detected is coun
 SEEN_THROUGH = 0.7  # free ratio above which a view is counted as seeing through the volume
 NEW_VIEW = 0.3  # view weight above which a detection becomes a measurement of the graph
 FIRST_MEASUREMENTS = 4  # measurements that enter the graph whatever their view weight
-
-
-@dataclass(frozen=True, slots=True)
-class EvidenceModels:
-    """The likelihoods outside the graph."""
-
-    appearance: AppearanceModel = field(default_factory=AppearanceModel)
-    rate: DetectionRate = field(default_factory=DetectionRate)
-    free_space: FreeSpace = field(default_factory=FreeSpace)
 
 
 def class_evidence(scores: list[ScoreEvidence], members: list[Landmark | Track]) -> np.ndarray:
@@ -109,7 +98,7 @@ class Observer:
         self, member: Landmark | Track, view: View, detection: LiftedDetection, visible: float, weight: float
     ) -> None:
         # what is cut off by the image border hides the object from the detector as an occluder does
-        occlusion = min(1.0 - visible, TRUNCATION)
+        occlusion = 1.0 - visible
         member.belief.add_scores(self._models.appearance.evidence(detection.scores, occlusion), weight)
         if isinstance(member, Landmark):
             scores = np.asarray(detection.scores, dtype=np.float32)

@@ -8,10 +8,10 @@ import numpy as np
 
 from ...factors.appearance import ScoreEvidence
 from ...factors.size_prior import ClassSizePriors
-from ..config import BeliefConfig, LifecycleConfig, TrackConfig
+from ..config import BeliefConfig, EvidenceModels, LifecycleConfig, TrackConfig
 from .association import Assignment
 from .beliefs import Belief, initial_site, propagate
-from .evidence import EvidenceModels, Observer
+from .evidence import Observer
 from .landmarks import Landmark, volume_overlaps
 from .ledger import Look, Scores
 from .lifting import LiftedDetection

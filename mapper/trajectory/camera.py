@@ -16,6 +16,7 @@ from .odometry import make_odometry
 from .up import UpMeasurement, camera_prior, from_accelerometer, from_planes
 from .visual import VisualOdometry
 
+UP_SOURCES = ("gravity file", "accelerometer", "planes", "camera prior")  # the best first
 GAUGE_SIGMAS = np.repeat([1e-3, 1e-3], 3)  # rad, m: the first camera defines the world
 
 
@@ -38,7 +39,7 @@ class CameraGraph:
         self._frames = FrameTrajectory()
         self._T_odometry_camera = np.eye(4)
         self._T_keyframe_camera = np.eye(4)
-        self._up_sources: list[str] = []
+        self._up_sources: set[str] = set()
         self._smoother: Smoother | None = None
 
     @property
@@ -94,11 +95,11 @@ class CameraGraph:
         return self._frames.poses(self.smoother.poses()) if self.started else self._frames.poses(np.empty((0, 4, 4)))
 
     def up(self) -> UpDirection:
-        """The world's up direction with its uncertainty and the best source that spoke of it."""
+        """The world's up direction with its uncertainty and the best source that spoke of it (`UP_SOURCES`)."""
         if not self.started:
             prior = camera_prior(self._config.up)
             return UpDirection(prior.direction, prior.sigma, prior.source)
-        return UpDirection(*self.smoother.up(), self._up_sources[-1])
+        return UpDirection(*self.smoother.up(), min(self._up_sources, key=UP_SOURCES.index))
 
     def _start(self, frame: Frame) -> np.ndarray:
         """The world: the dataset's with given poses, gravity-aligned where gravity is known, else the first camera."""
@@ -112,7 +113,7 @@ class CameraGraph:
         direction, sigma, source = T[:3, :3] @ up.direction, up.sigma, up.source
         if self._gravity is not None:
             direction, sigma, source = -self._gravity, self._config.up.gravity_sigma, "gravity file"
-        self._up_sources = [source]
+        self._up_sources = {source}
         self.intrinsics = frame.intrinsics
         self._smoother = Smoother(self._config.smoother, frame.intrinsics, self._config.up.upright_tolerance)
         self._smoother.add_first(T, GAUGE_SIGMAS, direction, sigma)
@@ -120,12 +121,12 @@ class CameraGraph:
 
     def _measure_up(self, frame: Frame, keyframe: int, T_world_camera: np.ndarray) -> None:
         config, smoother = self._config.up, self.smoother
-        measured: list[UpMeasurement | None] = [from_accelerometer(frame, config)]
+        # the first reading made the world's axes already
+        measured: list[UpMeasurement | None] = [from_accelerometer(frame, config) if keyframe > 0 else None]
         if self._gravity is None and keyframe % config.every == 0:
             expected = T_world_camera[:3, :3].T @ smoother.R_world_upright[:, 2]
             measured.append(from_planes(frame, expected, config))
         for up in measured:
             if up is not None:
                 smoother.add(Up(keyframe, up.direction, up.sigma))
-                if up.source not in self._up_sources:
-                    self._up_sources.append(up.source)
+                self._up_sources.add(up.source)

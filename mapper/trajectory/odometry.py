@@ -121,7 +121,7 @@ class PoseOdometry:
 
     def __init__(self, config: OdometryConfig) -> None:
         sigma_r, sigma_t = config.pose_sigma
-        self._covariance = np.diag(np.repeat([sigma_r**2, sigma_t**2], 3))
+        self._covariance = 2.0 * np.diag(np.repeat([sigma_r**2, sigma_t**2], 3))  # both ends are measured
         self._keyframes = _Keyframes(config)
         self._T = np.eye(4)
 

@@ -79,6 +79,8 @@ class VisualOdometry:
                 return None
             T_a_b = rigid_motion(source[inliers], target[inliers], _weights(target[inliers]))
             inliers = self._agree(T_a_b, source, target)
+        if inliers.sum() < self._config.min_inliers:
+            return None
         covariance = self._covariance(T_a_b, source[inliers], target[inliers])
         return VisualEdge(old.keyframe, new.keyframe, T_a_b, covariance, int(inliers.sum()))
 

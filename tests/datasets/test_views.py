@@ -14,6 +14,7 @@ class Ten:
     """Ten frames without pixels; the fourth is broken."""
 
     name = "ten"
+    names = tuple(f"frame-{i}" for i in range(10))
     intrinsics = Intrinsics(4, 3, 5.0, 5.0, 1.5, 1.0)
     gravity = np.array([0.0, 0.0, -1.0])
     poses: np.ndarray | None = np.arange(10.0)[:, None, None] + np.zeros((10, 4, 4))

@@ -15,15 +15,17 @@ def test_every_stage_has_its_own_readings():
     for pause in (0.002, 0.004, 0.03):
         with clock.stage("slow"):
             time.sleep(pause)
-    with clock.stage("quick"):
-        pass
+    for _ in range(5):
+        with clock.stage("quick"):
+            pass
     summary = clock.summary()
     assert list(summary) == ["slow", "quick"]
     slow, quick = summary["slow"], summary["quick"]
-    assert (slow["count"], quick["count"]) == (3, 1)
-    assert 4.0 <= slow["median_ms"] < slow["p95_ms"] <= 1e3 * slow["total_s"]
+    assert (slow["count"], quick["count"]) == (3, 5)
+    assert slow["median_ms"] >= 4.0
+    assert slow["median_ms"] < slow["p95_ms"] <= 1e3 * slow["total_s"]
     assert slow["total_s"] >= 0.036
-    assert quick["median_ms"] < 2.0 < slow["median_ms"]
+    assert quick["median_ms"] < slow["median_ms"]
     assert json.loads(json.dumps(summary)) == summary
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 import pytest
+
 from thingmap.datasets.frame import Frame, Intrinsics
 from thingmap.datasets.synthetic.sample import open_sample
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+
 from thingmap.datasets.frame import Frame, Intrinsics
 from thingmap.mapper.config import CloudConfig
 from thingmap.mapper.trajectory.cloud import KeyframeCloud, voxel_keys

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+
 from thingmap.mapper.config import KeyframeConfig
 from thingmap.mapper.trajectory.keyframes import FrameTrajectory, KeyframeSelector
 

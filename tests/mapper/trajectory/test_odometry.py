@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+
 from thingmap.datasets.frame import BrokenFrame, Frame, FrameProblem
 from thingmap.mapper.config import KeyframeConfig, OdometryConfig, OdometrySource
 from thingmap.mapper.trajectory.keyframes import KeyframeSelector
@@ -57,7 +58,7 @@ def test_inverse_undoes_a_motion(rotation_vector, translation):
 
 
 @settings(deadline=None, derandomize=True)
-@given(vectors.filter(lambda v: 1e-3 < np.linalg.norm(v)), st.floats(0.0, np.pi))
+@given(vectors.filter(lambda v: np.linalg.norm(v) > 1e-3), st.floats(0.0, np.pi))
 def test_the_angle_of_a_rotation(axis, angle):
     R = Rotation.from_rotvec(angle * np.array(axis) / np.linalg.norm(axis)).as_matrix()
     assert rotation_angle(R) == pytest.approx(angle, abs=1e-6)
@@ -163,6 +164,18 @@ def test_a_frame_without_depth_in_range_is_broken_and_changes_nothing(plane_fram
     assert one is not None and two is not None
     np.testing.assert_array_equal(one.T_a_b, two.T_a_b)
     np.testing.assert_array_equal(one.covariance, two.covariance)
+
+
+@pytest.mark.parametrize("step", [1, 3, 4])
+def test_points_are_those_of_every_few_pixels(plane_frame, step):
+    """Put back into the image they are at its readings; a shifted grid would tilt the whole scene."""
+    frame = plane_frame(CORNER)
+    points = KissOdometry(replace(SMALL, pixel_step=step))._points(frame)
+    pixels = frame.intrinsics.project(points)
+    column, row = np.rint(pixels).astype(int).T
+    np.testing.assert_allclose(pixels, np.stack([column, row], axis=1), atol=1e-6)
+    np.testing.assert_allclose(frame.depth[row, column], points[:, 2], rtol=1e-6)
+    assert len(points) == pytest.approx(frame.depth.size / step**2, rel=0.05)
 
 
 def test_readings_out_of_range_are_left_out(plane_frame):

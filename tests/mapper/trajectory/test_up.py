@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from thingmap.mapper.config import UpConfig
 from thingmap.mapper.trajectory.up import camera_prior, from_accelerometer, from_planes
 
@@ -71,7 +72,7 @@ def test_walls_do_not_count(plane_frame, lean):
 
 @pytest.mark.parametrize(("off", "counts"), [(CONFIG.max_tilt - 0.05, True), (CONFIG.max_tilt + 0.05, False)])
 def test_a_plane_too_far_from_the_expected_up_is_no_support(plane_frame, off, counts):
-    up, plane = support(0.7)
+    _, plane = support(0.7)
     expected = np.array([0.0, -np.cos(0.7 - off), -np.sin(0.7 - off)])
     assert (from_planes(plane_frame([plane]), expected, CONFIG) is not None) == counts
 
@@ -86,10 +87,13 @@ def test_a_small_plane_is_no_support(plane_frame):
     assert from_planes(cluttered, up, replace(CONFIG, min_plane_share=0.8)) is None
 
 
-@pytest.mark.parametrize("depth", [0.0, np.nan, 0.2, 7.0])
-def test_without_depth_in_range_there_is_no_plane(plane_frame, depth):
-    frame = plane_frame([support(0.7)[1]])
-    assert from_planes(replace(frame, depth=np.full_like(frame.depth, depth)), HELD, CONFIG) is None
+@pytest.mark.parametrize(("scale", "found"), [(1.0, True), (0.0, False), (np.nan, False), (0.1, False), (10.0, False)])
+def test_only_depth_in_range_makes_a_plane(plane_frame, scale, found):
+    """Scaled about the camera a plane stays a plane, with the same normal."""
+    up, plane = support(0.7)
+    frame = plane_frame([plane], noise=0.0)
+    scaled = replace(frame, depth=(frame.depth * np.float32(scale)))
+    assert (from_planes(scaled, up, CONFIG) is not None) == found
 
 
 @settings(deadline=None, derandomize=True)

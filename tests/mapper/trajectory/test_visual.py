@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+
 from thingmap.datasets.frame import Frame
 from thingmap.mapper.config import VisualConfig
 from thingmap.mapper.trajectory.visual import VisualEdge, VisualOdometry, _Features, rigid_motion
@@ -106,6 +107,18 @@ def test_the_motion_is_found_among_forty_percent_of_wrong_matches(seed):
     assert np.linalg.norm(error[:3]) < 0.004 and np.linalg.norm(error[3:]) < 0.006
 
 
+def test_near_points_count_for_more():
+    """Far ones, all misread by 40 mm in depth, move the answer by much less than half of that."""
+    rng = np.random.default_rng(5)
+    new = scene(rng, 100)
+    new[:, 2] = np.where(np.arange(100) < 50, 0.8, 3.0)
+    old = new.copy()
+    old[50:, 2] += 0.04
+    edge = edge_between(old, new)
+    assert edge is not None and edge.inliers == 100
+    assert 0.0 < edge.T_a_b[2, 3] < 0.01
+
+
 def test_matches_that_agree_on_nothing_give_no_edge():
     rng = np.random.default_rng(2)
     assert edge_between(scene(rng, 200), scene(rng, 200)) is None
@@ -118,7 +131,7 @@ def test_matches_that_agree_on_nothing_give_no_edge():
 def test_the_covariance_is_that_of_many_noisy_fits():
     """Noise grows with distance, as the fit's weights assume; the points lie to one side so that terms couple."""
     rng = np.random.default_rng(3)
-    T, new = motion(rng), scene(rng, 120) + [0.6, 0.0, 0.0]
+    T, new = motion(rng), scene(rng, 120) + np.array([0.6, 0.0, 0.0])
     errors, squares, predicted = [], [], []
     for _ in range(150):
         old = moved(T, new) + 0.002 * moved(T, new)[:, 2:] * rng.normal(size=new.shape)
