@@ -14,7 +14,7 @@ class Ten:
     """Ten frames without pixels; the fourth is broken."""
 
     name = "ten"
-    names = tuple(f"frame-{i}" for i in range(10))
+    names = tuple(f"f{i}" for i in range(10))
     intrinsics = Intrinsics(4, 3, 5.0, 5.0, 1.5, 1.0)
     gravity = np.array([0.0, 0.0, -1.0])
     poses: np.ndarray | None = np.arange(10.0)[:, None, None] + np.zeros((10, 4, 4))
@@ -52,6 +52,7 @@ def test_a_subset_keeps_names_and_renumbers(stride: int, most: int | None, kept:
     np.testing.assert_array_equal(part.stamps, np.array(kept) / 10)
     np.testing.assert_array_equal(part.poses[:, 0, 0], kept)
     assert (part.name, part.intrinsics) == ("ten", Ten.intrinsics)
+    assert part.names == tuple(f"f{i}" for i in kept)
     np.testing.assert_array_equal(part.gravity, [0, 0, -1])
     for position, original in enumerate(kept):
         if original != 3:
