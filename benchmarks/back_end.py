@@ -106,10 +106,7 @@ class BackEnd:
 
     def finish(self) -> None:
         """Brings every landmark up to date, as `SemanticMapper.object_map` does."""
-        self.smoother.settle()
-        for landmark in self.scene.landmarks.values():
-            self._lifecycle.refresh_fully(landmark)
-        self.smoother.settle()
+        self._lifecycle.bring_up_to_date()
 
     def _add_camera(self, simulated: SimulatedView) -> View:
         smoother, t = self.smoother, simulated.keyframe

@@ -13,7 +13,7 @@ from ..datasets.errors import UserError
 from ..datasets.frame import Frame
 from ..detectors.detections import Detections
 from ..detectors.detector import Detector
-from ..factors.size_prior import load_size_priors
+from ..factors.size_prior import ClassSizePriors, load_size_priors
 from .config import MapperConfig
 from .estimation.association import associate
 from .estimation.evidence import Observer, class_evidence, score_evidence
@@ -73,6 +73,7 @@ class SemanticMapper:
         self._outcomes: Counter[Outcome] = Counter()
         self._clock = StageClock()
         self._classes: tuple[str, ...] | None = None
+        self._priors: ClassSizePriors | None = None
         self._lifecycle: Lifecycle | None = None
         self._observer: Observer | None = None
 
@@ -127,13 +128,9 @@ class SemanticMapper:
 
     def object_map(self, include_doubtful: bool = False) -> ObjectMap:
         """The map as estimated now; `include_doubtful` adds what exists with less than 0.5 and what was retired."""
-        landmarks = list(self._scene.landmarks.values())
         if self._lifecycle is not None:
-            self._camera.smoother.settle()
-            for landmark in landmarks:
-                self._lifecycle.refresh_fully(landmark)
-            self._camera.smoother.settle()
-            self._lifecycle.refresh(set())
+            self._lifecycle.bring_up_to_date()
+        landmarks = list(self._scene.landmarks.values())
         if include_doubtful:
             landmarks += self._scene.retired.values()
         things = compose_things(landmarks, self._classes or (), 0.0 if include_doubtful else PROBABLE)
@@ -179,6 +176,10 @@ class SemanticMapper:
             if self._detector is None:
                 raise UserError("no detections: give the mapper a detector, or process_frame the frame's detections")
             detections = self._detector(frame)
+        if self._priors is None:
+            extra = Path(self.config.class_sizes) if self.config.class_sizes else None
+            self._priors = load_size_priors(detections.classes, extra)
+            self._classes = tuple(detections.classes)
         if self._classes is not None and tuple(detections.classes) != self._classes:
             raise UserError(
                 f"frame {frame.name}: expected detections over the same {len(self._classes)} classes as before, found "
@@ -187,17 +188,15 @@ class SemanticMapper:
         return detections
 
     def _lift(self, detections: Detections, frame: Frame) -> list[LiftedDetection]:
-        if self._classes is None:
-            self._classes = tuple(detections.classes)
-            self._start_back_end(self._classes)
+        if self._lifecycle is None:
+            self._start_back_end()
         lifted, refused = lift(detections, frame, self.config.lifting)
         self._outcomes.update(refused)
         return lifted
 
-    def _start_back_end(self, classes: tuple[str, ...]) -> None:
-        config, smoother = self.config, self._camera.smoother
-        extra = Path(config.class_sizes) if config.class_sizes else None
-        priors = load_size_priors(classes, extra)
+    def _start_back_end(self) -> None:
+        config, smoother, priors = self.config, self._camera.smoother, self._priors
+        assert priors is not None
         self._observer = Observer(self._scene, smoother, self._models, self._outcomes)
         configs = config.tracks, config.beliefs, config.lifecycle
         self._lifecycle = Lifecycle(

@@ -151,6 +151,8 @@ class Belief:
 
     def add_scores(self, evidence: ScoreEvidence, weight: float) -> None:
         """A detection's scores, seen with the given view weight."""
+        if not (evidence.own.any() or evidence.background.any()):
+            return  # the object was hidden: a view that says nothing is none
         self.own += weight * evidence.own
         self.excess += weight * (evidence.background - evidence.own)
         self.score_views += weight

@@ -67,7 +67,8 @@ class Observer:
         for m, member in enumerate(self._scene.members()):
             own = np.flatnonzero(assignment.target == m)
             hit = len(own) > 0 or bool(np.any(assignment.duplicate_of == m))
-            if not hit and targets.visible[m] <= 0.0:
+            # what hardly shows says nothing, nor does it use up its direction for a later look
+            if not hit and expected[m] <= 0.0 and seen[m] * known[m] * visibility.in_image[m, WHOLE] < EXPECTED:
                 self._count_unseen(member, view.keyframe, visibility.in_image[m, WHOLE])
                 continue
             weight = member.belief.views.weight(view.T_world_camera[:3, 3] - member.position)

@@ -7,9 +7,11 @@ measurements do.
 from __future__ import annotations
 
 import json
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -193,18 +195,27 @@ class Ledger:
             with np.load(path, allow_pickle=False) as file:
                 arrays = {name: file[name] for name in file.files}
             meta = json.loads(str(arrays.pop("meta")))
-        except (OSError, ValueError, KeyError) as error:
-            raise InputError(path, "a ledger (.npz)", str(error), "give the ledger.npz of a run") from None
-        if meta.get("schema") != SCHEMA:
-            raise InputError(path, f"schema {SCHEMA}", repr(meta.get("schema")), "map the sequence again")
-        numbered: list[tuple[int, Record]] = []
-        for kind in KINDS:
-            numbers = arrays.get(f"{kind.__name__}/number", np.empty(0, dtype=int))
-            columns = [_column(arrays[f"{kind.__name__}/{f.name}"], f.type) for f in fields(kind) if len(numbers)]
-            numbered += [(int(n), kind(*row)) for n, row in zip(numbers, zip(*columns, strict=True), strict=True)]
+            if meta["schema"] != SCHEMA:
+                raise ValueError(f"schema {meta['schema']!r} instead of {SCHEMA!r}")
+            records = _records(arrays)
+        # a damaged archive fails in NumPy, zipfile, zlib or here, in many ways
+        except (OSError, EOFError, ValueError, LookupError, TypeError, AttributeError, BadZipFile, zlib.error) as error:
+            found = str(error) or type(error).__name__
+            raise InputError(path, "a ledger (.npz)", found, "give the ledger.npz of a run, or map again") from None
         ledger = cls()
-        ledger._records = [record for _, record in sorted(numbered, key=lambda item: item[0])]
+        ledger._records = records
         return ledger, meta
+
+
+def _records(arrays: dict[str, np.ndarray]) -> list[Record]:
+    """Records from one array per kind and field, in the order of their numbers."""
+    numbered: list[tuple[int, Record]] = []
+    for kind in KINDS:
+        numbers = arrays.get(f"{kind.__name__}/number", np.empty(0, dtype=int))
+        columns = [_column(arrays[f"{kind.__name__}/{f.name}"], f.type) for f in fields(kind) if len(numbers)]
+        rows = list(zip(numbers, *columns, strict=True))
+        numbered += [(int(number), kind(*row)) for number, *row in rows]
+    return [record for _, record in sorted(numbered, key=lambda item: item[0])]
 
 
 def _column(values: np.ndarray, kind: object) -> list:

@@ -119,6 +119,7 @@ class Lifecycle:
     def refresh_fully(self, landmark: Landmark) -> None:
         """Takes the landmark's marginals from the graph and does one expectation propagation step."""
         number, smoother = landmark.number, self._smoother
+        landmark.position, landmark.log_size = smoother.position(number), smoother.log_size(number)
         covariance, site = smoother.log_size_covariance(number), smoother.sites[number]
         belief, outlier = landmark.belief.log_belief(), self._beliefs.size_outlier
         result = propagate(landmark.log_size, covariance, site, belief, self._priors, outlier)
@@ -128,6 +129,20 @@ class Lifecycle:
         landmark.refreshed_at = landmark.measurements
         if site.distance(result.site) > self._beliefs.site_tolerance:
             smoother.set_site(number, result.site)
+
+    def bring_up_to_date(self) -> None:
+        """Takes everything known into the landmarks, for a reader of the map; a second time changes nothing."""
+        smoother = self._smoother
+        smoother.settle()
+        for landmark in self._scene.landmarks.values():
+            if landmark.measurements != landmark.refreshed_at:
+                self.refresh_fully(landmark)
+        smoother.settle()
+        for number, landmark in self._scene.landmarks.items():
+            landmark.position, landmark.log_size = smoother.position(number), smoother.log_size(number)
+            landmark.covariance = smoother.position_covariance(number)
+            landmark.log_size_covariance = smoother.log_size_covariance(number)
+            landmark.belief.update()
 
     def merge(self) -> None:
         """Landmarks whose volumes overlap and whose positions agree under their joint covariance are one thing."""

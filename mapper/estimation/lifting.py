@@ -45,6 +45,8 @@ class LiftedDetection:
 def lift(detections: Detections, frame: Frame, config: LiftingConfig) -> tuple[list[LiftedDetection], list[Outcome]]:
     """The usable whole-object detections of a frame in space, and why the others are not usable."""
     lifted, refused = [], []
+    width, height = frame.intrinsics.width, frame.intrinsics.height
+    boxes = np.clip(detections.xyxy, 0.0, [width, height, width, height])  # not every source clips
     confidence = detections.confidence
     for i in range(len(detections)):
         if not confidence[i] >= config.min_confidence:
@@ -52,7 +54,7 @@ def lift(detections: Detections, frame: Frame, config: LiftingConfig) -> tuple[l
         elif detections.part[i] != Part.WHOLE:
             refused.append(Outcome.PART_UNUSED)
         else:
-            result = lift_box(detections.xyxy[i] - 0.5, detections.scores[i], frame, config)
+            result = lift_box(boxes[i] - 0.5, detections.scores[i], frame, config)
             (refused if isinstance(result, Outcome) else lifted).append(result)  # type: ignore[arg-type]
     return lifted, refused
 
@@ -67,6 +69,8 @@ def lift_box(xyxy: np.ndarray, scores: np.ndarray, frame: Frame, config: Lifting
     """
     k = frame.intrinsics
     centre_px, sides = (xyxy[:2] + xyxy[2:]) / 2.0, xyxy[2:] - xyxy[:2]
+    if not np.all(sides > 0.0):
+        return Outcome.NO_DEPTH
     readings = _central_depth(frame.depth, centre_px, sides * config.central_share / 2.0)
     if len(readings) < config.min_readings:
         return Outcome.NO_DEPTH

@@ -80,10 +80,12 @@ class Smoother:
 
     def add(self, record: Record) -> None:
         """Appends a measurement to the ledger, and its factors, if it has any, to the graph."""
+        factors = self._factors(record)  # before the ledger has it: an impossible measurement raises here
         number = self.ledger.append(record)
         if isinstance(record, NewLandmark | DepthCentre | Box):
             self._measurements[self.owner(record.landmark)].append(number)
-        self._queue_record(number)
+        if factors:
+            self._queue[("record", number)] = factors
 
     def set_site(self, landmark: int, site: SizeSite) -> None:
         """Replaces the Gaussian stand-in for the class mixture on a landmark's size."""
@@ -277,10 +279,13 @@ class Smoother:
         self._remove: list[int] = []
 
     def _queue_record(self, number: int) -> None:
-        context = FactorContext(self._config, self._intrinsics, self.R_world_upright, self.owner)
-        factors = record_factors(self.ledger[number], context)
+        factors = self._factors(self.ledger[number])
         if factors:
             self._queue[("record", number)] = factors
+
+    def _factors(self, record: Record) -> list[gtsam.NonlinearFactor]:
+        context = FactorContext(self._config, self._intrinsics, self.R_world_upright, self.owner)
+        return record_factors(record, context)
 
     def _drop(self, owner: Owner) -> None:
         self._queue.pop(owner, None)

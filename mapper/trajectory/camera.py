@@ -65,7 +65,7 @@ class CameraGraph:
             BrokenFrame: where it cannot be registered; nothing has changed then.
         """
         self._T_odometry_camera = self._odometry.register(frame)
-        if self._selector.is_keyframe(self._T_odometry_camera):
+        if self._selector.is_keyframe(self._T_odometry_camera) or not self.started:
             return True
         last = self.smoother.keyframes - 1
         self._T_keyframe_camera = self._frames.append(frame.stamp, self._T_odometry_camera, last, False)

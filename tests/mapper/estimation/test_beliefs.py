@@ -124,7 +124,6 @@ def test_not_being_seen_while_occluded_changes_nothing(views):
     np.testing.assert_allclose(after.posterior, before.posterior, atol=1e-12)
 
 
-@pytest.mark.xfail(strict=True, reason="`add_scores` counts a view for the heights of scores although it said nothing")
 def test_a_box_on_the_occluder_says_nothing_about_the_class():
     before, after = make(), make()
     for belief in (before, after):

@@ -138,7 +138,6 @@ def flip_bytes(path: Path) -> None:
     path.write_bytes(bytes(content))
 
 
-@pytest.mark.xfail(strict=True, reason="Ledger.load lets BadZipFile, EOFError, zlib.error, KeyError and others through")
 @pytest.mark.parametrize(
     "damage",
     [

@@ -202,9 +202,6 @@ def test_records_of_evidence_touch_no_factor(two_views):
     assert len(smoother.ledger) == count + 2
 
 
-@pytest.mark.xfail(
-    strict=True, reason="`add` appends to the ledger before the factor is made; a rebuild meets it again"
-)
 def test_an_impossible_measurement_is_refused_and_forgotten(two_views, tools):
     smoother = two_views().smoother
     before = len(smoother.ledger)

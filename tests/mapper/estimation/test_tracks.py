@@ -1,0 +1,89 @@
+"""Candidates: position by a Kalman filter, size by medians, ripe or lost by counting."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from thingmap.factors.free_space import FreeSpace
+from thingmap.factors.missed import DetectionRate
+from thingmap.mapper.config import BeliefConfig, TrackConfig
+from thingmap.mapper.estimation.beliefs import Belief
+from thingmap.mapper.estimation.lifting import LiftedDetection
+from thingmap.mapper.estimation.tracks import Track
+
+CONFIG = TrackConfig()
+
+
+def make(position=(0.0, 0.0, 1.0), sigma: float = 0.1) -> Track:
+    belief = Belief(2, BeliefConfig(), DetectionRate(), FreeSpace())
+    return Track(1, np.array(position), sigma**2 * np.eye(3), belief)
+
+
+def observation(keyframe: int, half_extents) -> tuple[int, LiftedDetection, float, float]:
+    detection = LiftedDetection(
+        np.zeros(2), np.zeros(4), np.ones(4, bool), 1.0, np.array([0.0, 0.0, 1.0]), 0.1, 0.1, np.array(half_extents)
+    )
+    return keyframe, detection, 1.0, 1.0
+
+
+def test_measurements_average_by_their_information():
+    """1.0 m with 0.1 m, then 1.3 m with 0.2 m: the second weighs a quarter as much."""
+    track = make()
+    track.correct(np.array([0.0, 0.0, 1.3]), 0.2**2 * np.eye(3))
+    np.testing.assert_allclose(track.position, [0.0, 0.0, (4 * 1.0 + 1.3) / 5], atol=1e-12)
+    np.testing.assert_allclose(track.covariance, np.eye(3) / (1 / 0.1**2 + 1 / 0.2**2), atol=1e-12)
+
+
+def test_a_wide_axis_of_the_measurement_moves_nothing():
+    track = make()
+    track.correct(np.array([0.4, 0.0, 1.4]), np.diag([1e6, 1e-2, 1e-2]))
+    np.testing.assert_allclose(track.position, [0.0, 0.0, 1.2], atol=1e-4)
+
+
+def test_time_widens_the_position_and_does_not_move_it():
+    track = make()
+    for _ in range(9):
+        track.predict(CONFIG)
+    np.testing.assert_allclose(track.position, [0.0, 0.0, 1.0])
+    np.testing.assert_allclose(track.covariance, (0.1**2 + 9 * CONFIG.process_sigma**2) * np.eye(3), atol=1e-12)
+
+
+def test_what_is_read_cannot_change_the_filter():
+    track = make()
+    track.position[:] = 9.0
+    track.covariance[:] = 9.0
+    np.testing.assert_allclose(track.position, [0.0, 0.0, 1.0])
+    np.testing.assert_allclose(track.covariance, 0.01 * np.eye(3))
+
+
+def test_the_start_is_copied():
+    start, covariance = np.zeros(3), np.eye(3)
+    track = Track(1, start, covariance, make().belief)
+    track.correct(np.ones(3), np.eye(3))
+    np.testing.assert_array_equal(start, 0.0)
+    np.testing.assert_array_equal(covariance, np.eye(3))
+
+
+def test_the_size_is_the_median_of_the_boxes():
+    track = make()
+    for t, (width, height) in enumerate([(0.10, 0.20), (0.12, 0.18), (0.60, 0.90)]):
+        track.observations.append(observation(t, (width, 0.05, height)))
+    np.testing.assert_allclose(np.exp(track.log_size), [0.12, 0.12, 0.20])
+
+
+@pytest.mark.parametrize(
+    ("hits", "misses", "ripe"), [(2, 0, False), (3, 0, True), (3, 7, True), (3, 8, False), (6, 14, True)]
+)
+def test_ripe_by_hits_and_their_rate(hits, misses, ripe):
+    track = make()
+    track.hits, track.misses = set(range(hits)), set(range(100, 100 + misses))
+    assert track.is_ripe(CONFIG) is ripe
+
+
+def test_lost_after_misses_in_a_row():
+    track = make()
+    track.misses_in_a_row = CONFIG.max_misses - 1
+    assert not track.is_lost(CONFIG)
+    track.misses_in_a_row += 1
+    assert track.is_lost(CONFIG)
