@@ -127,7 +127,7 @@ class BeliefConfig:
     view_log_range: float = 0.3  # the same for log distance
     min_weight: float = 0.05  # a repeated view still counts this much
     score_correlation: float = 0.5  # of the score heights of one object's views: at most 2 views' worth
-    steady_confusion: float = 0.15  # objects that look like one of another class from every side
+    steady_confusion: float = 0.1  # objects that look like one of another class from every side
     size_outlier: float = 0.05  # objects of which only a part is ever measured, such as chairs pushed under a table
     site_tolerance: float = 0.05  # symmetric change of a size site below which it is left as it is
 
