@@ -84,7 +84,7 @@ class LiftingConfig:
     central_share: float = 0.5  # of width and height: the part of the box whose depth is read
     min_readings: int = 12  # pixels with depth
     max_range: float = 6.0  # m, beyond it Kinect depth is worse than 10 cm
-    surface_offset: float = 0.5  # of the half depth, from that surface to the centre: 1 for a box, 0 for a flat thing
+    surface_offset: float = 0.7  # of the half depth, from that surface to the centre: 1 for a box, 0 for a flat thing
     border: int = 3  # px: a box side this close to the image border is cut off by it
     sigma_px: float = 2.5  # px, floor of a box side's noise
     sigma_relative: float = 0.06  # of the box's side lengths: noise of a box side grows with the box

