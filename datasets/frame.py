@@ -44,6 +44,7 @@ class FrameProblem(Enum):
     SIZE_MISMATCH = "image size differs from the sequence's"
     NO_DEPTH = "no valid depth"
     MISSING_POSE = "missing pose"
+    OTHER_CAMERA = "intrinsics differ from the first frame's"
 
 
 class BrokenFrame(Exception):

@@ -135,6 +135,12 @@ class ViewHistory:
             self._log_ranges = np.append(self._log_ranges, log_range)
         return max(c.min_weight, novelty)
 
+    def absorb(self, other: ViewHistory) -> None:
+        """Takes over the views of a landmark merged into this one's; their directions are seen already."""
+        room = self.MAX_VIEWS - len(self._log_ranges)
+        self._directions = np.vstack([self._directions, other._directions[:room]])
+        self._log_ranges = np.append(self._log_ranges, other._log_ranges[:room])
+
 
 class Belief:
     """Everything but geometry that is known about one landmark."""
@@ -168,6 +174,7 @@ class Belief:
         self.own += other.own
         self.excess += other.excess
         self.score_views += other.score_views
+        self.views.absorb(other.views)
         self.add_view(other.hits, other.misses, other.free)
 
     def log_belief(self) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...datasets.frame import Frame
+from ...datasets.frame import BrokenFrame, Frame, FrameProblem
 from ..config import MapperConfig, OdometrySource
 from ..estimation.ledger import Up, Visual
 from ..estimation.smoother import Smoother
@@ -62,8 +62,10 @@ class CameraGraph:
         """Registers a frame; True where it is to become a keyframe (`add_keyframe`).
 
         Raises:
-            BrokenFrame: where it cannot be registered; nothing has changed then.
+            BrokenFrame: where it cannot be registered, or is of another camera; nothing has changed then.
         """
+        if self.started and frame.intrinsics != self.intrinsics:
+            raise BrokenFrame(frame.name, FrameProblem.OTHER_CAMERA)
         self._T_odometry_camera = self._odometry.register(frame)
         if self._selector.is_keyframe(self._T_odometry_camera) or not self.started:
             return True

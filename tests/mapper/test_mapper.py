@@ -331,6 +331,14 @@ def test_a_missing_file_of_class_sizes_is_named_and_breaks_nothing(frames, detec
     assert_readable(mapper)
 
 
+def test_a_frame_of_another_camera_is_refused(half, frames, detections):
+    other = open_sample("tabletop?frames=41&width=640")[40]
+    before = half.object_map()
+    with pytest.raises((BrokenFrame, UserError)):
+        half.process_frame(other, detections[10])
+    assert as_text(half.object_map()) == as_text(before)
+
+
 def test_boxes_that_mean_nothing_do_no_harm(frames, detections):
     """Boxes without depth, of no size, beyond the image or far below the threshold among the good ones."""
     mapper = SemanticMapper()

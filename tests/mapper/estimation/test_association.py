@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from thingmap.datasets.frame import Intrinsics
 from thingmap.factors.appearance import AppearanceModel
@@ -31,12 +32,14 @@ class Member:
     belief: Belief = field(default_factory=lambda: Belief(3, BeliefConfig(), DetectionRate(), FreeSpace()))
 
 
-def box_at(centre, half_axes=HALF_AXES, T: np.ndarray | None = None) -> np.ndarray:
+def box_at(centre: ArrayLike, half_axes: ArrayLike = HALF_AXES, T: np.ndarray | None = None) -> np.ndarray:
     log_size = np.log(half_axes)[None]
     return project_volumes(np.eye(4) if T is None else T, np.eye(3), np.array([centre]), log_size, KINECT)[0][0]
 
 
-def detection(centre, sigma: float = 0.03, xyxy: np.ndarray | None = None, half_axes=HALF_AXES) -> LiftedDetection:
+def detection(
+    centre: ArrayLike, sigma: float = 0.03, xyxy: ArrayLike | None = None, half_axes: ArrayLike = HALF_AXES
+) -> LiftedDetection:
     """Something seen at (3,) in the camera."""
     box = box_at(centre, half_axes) if xyxy is None else np.array(xyxy, dtype=float)
     return LiftedDetection(
@@ -45,7 +48,9 @@ def detection(centre, sigma: float = 0.03, xyxy: np.ndarray | None = None, half_
     )  # fmt: skip
 
 
-def targets(*centres, sigma: float = 0.03, half_axes=HALF_AXES, visible: float = 1.0) -> Targets:
+def targets(
+    *centres: ArrayLike, sigma: float = 0.03, half_axes: ArrayLike = HALF_AXES, visible: float = 1.0
+) -> Targets:
     positions = np.array(centres, dtype=float).reshape(-1, 3)
     count, size = len(positions), np.log(half_axes)
     boxes = np.array([box_at(p, half_axes) for p in positions]).reshape(-1, 4)
@@ -58,7 +63,7 @@ def targets(*centres, sigma: float = 0.03, half_axes=HALF_AXES, visible: float =
     )
 
 
-def run(detections, seen: Targets, evidence: np.ndarray | None = None, T=None, config=CONFIG) -> Assignment:
+def run(detections, seen: Targets, evidence: ArrayLike | None = None, T=None, config=CONFIG) -> Assignment:
     log_ratio = np.zeros((len(detections), len(seen))) if evidence is None else np.array(evidence, dtype=float)
     return associate(detections, seen, log_ratio, np.eye(4) if T is None else T, np.eye(3), config)
 
@@ -114,6 +119,24 @@ def test_the_gate_is_a_mahalanobis_distance():
     across = replace(targets(A), covariances=np.diag([0.04, 0.04, 1e-4])[None])
     assert run([off], along).target.tolist() == [0]
     assert run([off], across).target.tolist() == [-1]
+
+
+def test_no_class_evidence_opens_the_gate():
+    """The scores are those of this very target, which is 0.25 m away."""
+    off = detection((0.0, 0.0, 2.25), xyxy=box_at(A))
+    assert run([off], targets(A), [[30.0]]).target.tolist() == [-1]
+    assert run([detection(A)], targets(A), [[30.0]]).target.tolist() == [0]
+
+
+def test_a_detection_is_unsure_along_its_own_ray_wherever_the_camera_looks():
+    """With range noise of half a metre, 0.3 m off is near along the ray and far across it. The camera looks along x."""
+    T = np.eye(4)
+    T[:3, :3] = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+    vague = replace(detection(A), sigma_range=0.5)
+    for offset, expected in (((0.3, 0.0, 0.0), 0), ((0.0, 0.3, 0.0), -1), ((0.0, 0.0, 0.3), -1)):
+        place = T[:3, :3] @ A + offset
+        seen = replace(targets(A), positions=place[None])  # its box stays where the detection is
+        assert run([vague], seen, T=T).target.tolist() == [expected]
 
 
 def test_the_hungarian_assignment_beats_the_greedy_one():

@@ -227,6 +227,13 @@ def test_absorbed_evidence_counts_as_one_s_own():
     assert one.effective_views == pytest.approx(3.0)
 
 
+def test_a_view_of_either_is_no_new_view_of_both():
+    kept, absorbed, place = make(), make(), np.array([1.0, 0.0, 0.5])
+    absorbed.views.weight(place)
+    kept.absorb(absorbed)
+    assert kept.views.weight(place) == CONFIG.min_weight
+
+
 def test_the_first_site_is_the_mixture_of_the_class_sizes():
     priors, belief = load_size_priors(CLASSES), make()
     sure = np.zeros(len(CLASSES) + 1)

@@ -129,19 +129,22 @@ def test_an_object_out_of_view_hears_nothing(stage, landmark):
     assert stage.outcomes[Outcome.OUT_OF_VIEW] == 1
 
 
-def test_the_more_is_hidden_the_less_a_miss_says(tools, cup, unseen):
-    misses = {}
+def test_the_more_is_hidden_the_less_a_miss_and_a_surface_say(tools, cup, unseen):
+    misses, surface = {}, {}
     for hidden in (0.0, 0.3, 0.45, 0.8):
         stage = tools.Stage()
         for x in (-0.8, -0.6, -0.4):
             stage.show(x, cup)
+        before = stage.scene.landmarks[1].belief.free
         edge = -0.05 + 0.1 * hidden  # of a wall half way to the cup, which is 0.1 m wide there
         view = stage.show(0.0, unseen, tools.Thing((edge - 2.0, -1.0, 0.0), (2.0, 0.01, 2.0)))
         visible = stage.scene.predict(view, stage.config.association)[0].visible[0]
         assert visible == pytest.approx(1.0 - hidden, abs=0.15)
         misses[hidden] = stage.scene.landmarks[1].belief.misses
+        surface[hidden] = stage.scene.landmarks[1].belief.free - before
     assert misses[0.0] == pytest.approx(1.0, abs=0.02)
     assert misses[0.0] > misses[0.3] > misses[0.45] > misses[0.8] == 0.0
+    assert surface[0.0] > surface[0.3] + 0.1 > surface[0.45] + 0.2 > 0.2  # so does a surface where it should be
 
 
 def test_pixels_without_depth_say_nothing(stage, landmark, unseen):

@@ -31,6 +31,10 @@ def random_problem(seed: int, classes: int) -> tuple[ClassSizePriors, np.ndarray
     return priors, np.log(rng.dirichlet(np.full(classes + 1, 2.0)))
 
 
+def log_normal(x: np.ndarray, mean: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    return multivariate_normal(mean, covariance).logpdf(x)  # type: ignore[arg-type]
+
+
 def components(k: int, outlier: float) -> list[tuple[int, float]]:
     """The Gaussians that class k's size follows, with log weights: its own, or the wide one for outliers."""
     if k == 0 or outlier == 0.0:
@@ -48,13 +52,13 @@ def enumerate_exactly(
     count = len(beliefs)
     rows: list[tuple[tuple[int, ...], float, np.ndarray]] = []
     for classes in itertools.product(range(len(priors.mean)), repeat=count):
-        belief = sum(beliefs[i][k] for i, k in enumerate(classes))
+        belief = float(sum(beliefs[i][k] for i, k in enumerate(classes)))
         for parts in itertools.product(*(components(k, outlier) for k in classes)):
             mean = np.concatenate([priors.mean[c] for c, _ in parts])
             prior = np.zeros((3 * count, 3 * count))
             for i, (c, _) in enumerate(parts):
                 prior[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = priors.covariance[c]
-            log_z = multivariate_normal.logpdf(z, mean, prior + noise)
+            log_z = float(log_normal(z, mean, prior + noise))
             size = mean + prior @ np.linalg.solve(prior + noise, z - mean)
             rows.append((classes, belief + log_z + sum(w for _, w in parts), size))
     weight = softmax([w for _, w, _ in rows])
@@ -127,11 +131,9 @@ def test_one_object_against_numerical_integration(outlier):
     z, noise = MUG + np.array([0.2, -0.1, 0.15]), np.diag([0.15, 0.2, 0.25]) ** 2
     axes = [z[i] + np.linspace(-6.0, 6.0, 49) * np.sqrt(noise[i, i]) for i in range(3)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    own = np.array(
-        [multivariate_normal.logpdf(grid, m, C) for m, C in zip(priors.mean, priors.covariance, strict=True)]
-    )
+    own = np.array([log_normal(grid, m, C) for m, C in zip(priors.mean, priors.covariance, strict=True)])
     density = np.array([logsumexp([own[c] + w for c, w in components(k, outlier)], axis=0) for k in range(len(own))])
-    joint = density + belief[:, None] + multivariate_normal.logpdf(grid, z, noise)[None]
+    joint = density + belief[:, None] + log_normal(grid, z, noise)[None]
     weight = np.exp(joint - joint.max())
     weight /= weight.sum()
     measurement = gtsam.PriorFactorVector(S(0), z, gtsam.noiseModel.Gaussian.Covariance(noise))
