@@ -4,27 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence as Rows
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from ..datasets.frame import BrokenFrame, Frame
 from ..datasets.sequence import Sequence
-from ..datasets.truth import HasTruth, TrueObject
+from ..datasets.truth import HasClutter, HasTruth
 
 HIDDEN = 0.05  # metres; a spot lies behind a surface that is nearer than it by this much
 FRAMES_SEARCHED = 3
 REACH = (0.5, 3.0)  # metres from the camera at which spots of the background are looked for
 BACKGROUND_SIZE = (0.07, 0.22)  # metres, width of what is taken for an object
 BACKGROUND_ASPECT = (0.6, 1.8)  # height / width
-
-
-@runtime_checkable
-class HasClutter(Protocol):
-    """A sequence that also knows the things of no class."""
-
-    @property
-    def clutter(self) -> tuple[TrueObject, ...]: ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)

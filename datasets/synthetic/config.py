@@ -1,0 +1,83 @@
+"""What to render: a preset and everything that can be changed about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+
+from ..errors import UserError
+from .camera import ColorCamera
+from .sensor import DepthSensor
+
+
+class Preset(StrEnum):
+    """Scenes with their camera paths."""
+
+    TABLETOP = "tabletop"  # hand-held orbit about a table, as in RGB-D Scenes v2
+    SURVEY = "survey"  # way points on an arc, one every 5 degrees, as in the UBC Visual Robot Survey
+    KITCHEN = "kitchen"  # a walk through two rooms
+    LAPS = "laps"  # the same rooms again and again, for loop closure and long-run growth
+
+
+class ClutterLevel(StrEnum):
+    """How much stands around and before the objects."""
+
+    LOW = "low"
+    MEDIUM = "medium"
+    HIGH = "high"
+
+
+DEFAULT_OBJECTS = {Preset.TABLETOP: 12, Preset.SURVEY: 12, Preset.KITCHEN: 24, Preset.LAPS: 24}
+DEFAULT_FRAMES = {Preset.TABLETOP: 300, Preset.SURVEY: 37, Preset.KITCHEN: 900, Preset.LAPS: 3600}
+LIMITS = {"seed": (0, 2**31 - 1), "objects": (1, 100), "frames": (1, 20000), "width": (64, 1280), "blur": (0, 16)}
+
+
+@dataclass(frozen=True, slots=True)
+class SyntheticConfig:
+    """What to render.
+
+    Attributes:
+        preset: scene and path.
+        objects: number of things of the synthetic classes (imported meshes among them); None for the preset's.
+        clutter: how much else stands there, and how closely.
+        seed: of the scene, the path and the noise.
+        frames: length of the sequence; None for the preset's. A longer one begins with the same frames.
+        width: pixels, divisible by 4; images are 4:3 with the field of view of f = 525 at 640 x 480.
+        meshes: folder of textured OBJ or GLB scans that take part as objects, or None.
+        blur: renderings averaged over the exposure for motion blur; 0 or 1 for none.
+        sensor: the depth sensor.
+        camera: the colour camera.
+
+    Raises:
+        UserError: a number outside its limits.
+    """
+
+    preset: Preset = Preset.TABLETOP
+    objects: int | None = None
+    clutter: ClutterLevel = ClutterLevel.MEDIUM
+    seed: int = 0
+    frames: int | None = None
+    width: int = 640
+    meshes: Path | None = None
+    blur: int = 0
+    sensor: DepthSensor = field(default_factory=DepthSensor)
+    camera: ColorCamera = field(default_factory=ColorCamera)
+
+    def __post_init__(self) -> None:
+        for name, (low, high) in LIMITS.items():
+            value = getattr(self, name)
+            if value is not None and not low <= value <= high:
+                raise UserError(f"synth:{self.preset}: expected {name} from {low} to {high}, found {value}; change it")
+        if self.width % 4:
+            raise UserError(f"synth:{self.preset}: expected a width divisible by 4, found {self.width}; change it")
+
+    @property
+    def object_count(self) -> int:
+        """Objects to place."""
+        return DEFAULT_OBJECTS[self.preset] if self.objects is None else self.objects
+
+    @property
+    def frame_count(self) -> int:
+        """Frames to render."""
+        return DEFAULT_FRAMES[self.preset] if self.frames is None else self.frames

@@ -1,0 +1,1 @@
+"""The evaluator: a map against the truth, one module a protocol."""
