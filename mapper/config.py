@@ -130,12 +130,18 @@ class BeliefConfig:
     steady_confusion: float = 0.1  # objects that look like one of another class from every side
     size_outlier: float = 0.05  # objects of which only a part is ever measured, such as chairs pushed under a table
     site_tolerance: float = 0.05  # symmetric change of a size site below which it is left as it is
+    size_coupling: bool = True  # off: sizes say nothing of classes, nor classes of sizes
 
 
 @dataclass(frozen=True, slots=True)
 class EvidenceModels:
-    """The likelihoods outside the graph; each says where its numbers come from."""
+    """The likelihoods outside the graph; each says where its numbers come from.
 
+    The switches turn a kind of evidence off, to measure what it is worth (benchmarks/run.py).
+    """
+
+    occlusion: bool = True  # off: as if nothing were ever hidden, nor seen through (Meger et al., Clutter, VI-C)
+    misses: bool = True  # off: what should have been seen and was not says nothing
     appearance: AppearanceModel = field(default_factory=AppearanceModel)
     rate: DetectionRate = field(default_factory=DetectionRate)
     free_space: FreeSpace = field(default_factory=FreeSpace)
@@ -154,6 +160,7 @@ class SmootherConfig:
     guard_position: float = 10.0  # m, weak permanent prior on positions
     guard_size: float = 1.5  # log units, weak permanent prior on sizes
     robust_odometry: bool = False
+    joint: bool = True  # off: objects do not move cameras; each is estimated by itself from poses taken as exact
 
 
 @dataclass(frozen=True, slots=True)

@@ -107,7 +107,7 @@ class SemanticMapper:
         assert self._lifecycle is not None and self._observer is not None
         lifecycle, observer, smoother = self._lifecycle, self._observer, self._camera.smoother
         with stage("visibility"):
-            targets, visibility = scene.predict(view, config.association)
+            targets, visibility = scene.predict(view, config.association, models.occlusion)
         with stage("association"):
             scores = score_evidence(lifted, models.appearance)
             evidence = class_evidence(scores, scene.members())
@@ -145,6 +145,13 @@ class SemanticMapper:
     def trajectory(self) -> tuple[np.ndarray, np.ndarray]:
         """(N,) stamps and (N, 4, 4) `T_world_camera` of every processed frame, as estimated now."""
         return self._camera.trajectory()
+
+    def keyframes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(M,) stamps, (M, 4, 4) `T_world_camera` of the keyframes and (M, 6, 6) covariances (right tangent, rad, m).
+
+        Covariances are relative to the first camera, which defines the world.
+        """
+        return self._camera.keyframes()
 
     def cloud(self) -> tuple[np.ndarray, np.ndarray]:
         """(M, 3) float32 points, world, metres, and (M, 3) uint8 RGB, one a voxel."""

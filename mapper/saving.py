@@ -36,6 +36,7 @@ def save_run(
     object_map = mapper.object_map(include_doubtful)
     folder.write_config(config)
     folder.write_trajectory(*mapper.trajectory())
+    folder.write_keyframes(*mapper.keyframes())
     folder.write_cloud(*mapper.cloud())
     with replacing(folder.ledger_file) as temporary:
         mapper.save_ledger(temporary)

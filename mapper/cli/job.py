@@ -34,6 +34,7 @@ class MappingJob:
         config: YAML of the configuration in use.
         command: the options, for the report.
         include_doubtful: write things whose existence is below 0.5 too.
+        snapshots: after how many mapped frames to write the map besides.
     """
 
     sequence: Sequence
@@ -44,6 +45,7 @@ class MappingJob:
     config: str
     command: dict[str, Any]
     include_doubtful: bool
+    snapshots: tuple[int, ...] = ()
     _run: SequenceRun = field(init=False)
 
     def execute(self) -> None:
@@ -55,10 +57,12 @@ class MappingJob:
             Exception: whatever else ended the run.
         """
         from ..runner import SequenceRun
+        from ..snapshots import SnapshotWriter
 
+        write_snapshot = SnapshotWriter(self.folder, self.mapper, self.snapshots)
         with stop_on_interrupt() as should_stop:
             with FrameProgress("mapping", len(self.sequence)) as progress:
-                self._run = SequenceRun(self.sequence, self.mapper, _shower(progress), should_stop)
+                self._run = SequenceRun(self.sequence, self.mapper, _shower(progress, write_snapshot), should_stop)
                 try:
                     self._run.execute()
                 except Exception as error:
@@ -106,8 +110,9 @@ class MappingJob:
             raise typer.Exit(130)
 
 
-def _shower(progress: FrameProgress) -> Callable[[Progress], None]:
+def _shower(progress: FrameProgress, then: Callable[[Progress], None]) -> Callable[[Progress], None]:
     def show(now: Progress) -> None:
+        then(now)
         if now.done == now.skipped:
             return  # nothing is mapped yet, and perhaps nothing can be
         skipped = f", {now.skipped} skipped" if now.skipped else ""

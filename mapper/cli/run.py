@@ -37,10 +37,13 @@ def run(
     seed: Annotated[int | None, typer.Option(metavar="N", help="Of everything random.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the files of an earlier run.")] = False,
     include_doubtful: Annotated[bool, typer.Option("--all", help="Write things that probably are not there.")] = False,
+    snapshots: Annotated[
+        str | None, typer.Option(metavar="N,N,...", help="Write the map after so many frames too, for `evaluate`.")
+    ] = None,
 ) -> None:
     """Map a sequence.
 
-    OUT gets map.json, trajectory.txt, cloud.ply, config.yaml, report.json and ledger.npz.
+    OUT gets map.json, trajectory.txt, keyframes.npz, cloud.ply, config.yaml, report.json and ledger.npz.
 
     Ctrl-C ends the run after the frame at hand and writes what is mapped so far.
     """
@@ -50,6 +53,7 @@ def run(
     from ..config_file import dump_config
     from ..map.store import OutputFolder
     from ..mapper import SemanticMapper
+    from ..snapshots import parse_snapshot_frames
     from .job import MappingJob
 
     OutputFolder.check(output, overwrite)
@@ -74,6 +78,7 @@ def run(
             "max_frames": max_frames,
         },
         include_doubtful=include_doubtful,
+        snapshots=parse_snapshot_frames(snapshots) if snapshots is not None else (),
     ).execute()
 
 

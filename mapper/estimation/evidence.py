@@ -59,7 +59,7 @@ class Observer:
         """Adds the view's evidence to all members; returns the numbers of the landmarks it touched."""
         # where depth has no reading nobody knows what is hidden
         known = 1.0 - visibility.missing[:, WHOLE]
-        expected = self._models.rate.expected(targets.visible, targets.side_px) * known
+        expected = self._models.rate.expected(targets.visible, targets.side_px) * known * self._models.misses
         seen = visibility.agreeing[:, WHOLE] + visibility.free[:, WHOLE]
         free = np.divide(visibility.free[:, WHOLE], seen, out=np.zeros(len(seen)), where=seen > 0)
         free_look = self._models.free_space.log_likelihood(free) * seen * known * visibility.in_image[:, WHOLE]

@@ -94,7 +94,10 @@ class Lifecycle:
             number, track.belief, track.position, track.log_size, track.first_seen, track.last_seen, track.covariance
         )
         landmark.supporting, landmark.contradicting = track.hits, track.misses
-        site = initial_site(self._priors, track.belief.posterior)
+        known = track.belief.posterior
+        if not self._beliefs.size_coupling:
+            known = np.eye(len(known))[0]
+        site = initial_site(self._priors, known)
         self._smoother.add_landmark(number, track.position, track.log_size, site)
         for keyframe, detection, visible, weight in track.observations:
             scores = np.asarray(detection.scores, dtype=np.float32)
@@ -121,12 +124,15 @@ class Lifecycle:
         number, smoother = landmark.number, self._smoother
         landmark.position, landmark.log_size = smoother.position(number), smoother.log_size(number)
         covariance, site = smoother.log_size_covariance(number), smoother.sites[number]
-        belief, outlier = landmark.belief.log_belief(), self._beliefs.size_outlier
-        result = propagate(landmark.log_size, covariance, site, belief, self._priors, outlier)
-        landmark.belief.update(result.log_z)
         landmark.covariance = smoother.position_covariance(number)
         landmark.log_size_covariance = covariance
         landmark.refreshed_at = landmark.measurements
+        if not self._beliefs.size_coupling:
+            landmark.belief.update()
+            return
+        belief, outlier = landmark.belief.log_belief(), self._beliefs.size_outlier
+        result = propagate(landmark.log_size, covariance, site, belief, self._priors, outlier)
+        landmark.belief.update(result.log_z)
         if site.distance(result.site) > self._beliefs.site_tolerance:
             smoother.set_site(number, result.site)
 

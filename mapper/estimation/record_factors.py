@@ -1,6 +1,6 @@
 """From ledger records to factors of the graph.
 
-X(t) keyframe pose     Pose3   T_world_camera
+X(t) keyframe pose     Pose3   T_world_camera; F(t) is its fixed copy, in use only where objects do not move cameras
 L(j) object position   Point3  world, metres
 S(j) log half-axes     Vector3 in the upright frame
 U(0) up direction      Unit3   world axes
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import gtsam
 import numpy as np
-from gtsam.symbol_shorthand import L, S, U, X
+from gtsam.symbol_shorthand import F, L, S, U, X
 
 from ...datasets.frame import Intrinsics
 from ...factors.attitude import attitude_factor, up_prior
@@ -49,6 +49,10 @@ class FactorContext:
     R_world_upright: np.ndarray
     owner: Callable[[int], int]
 
+    def seen_from(self, record: DepthCentre | Box) -> int:
+        """Key of the pose an object was seen from: the camera's own, or a fixed copy of it."""
+        return X(record.keyframe) if self.config.joint else F(record.keyframe)
+
 
 def record_factors(record: Record, context: FactorContext) -> list[gtsam.NonlinearFactor]:
     """The factors of one ledger record; none for evidence that lives outside the graph."""
@@ -75,10 +79,10 @@ def record_factors(record: Record, context: FactorContext) -> list[gtsam.Nonline
         case DepthCentre():
             sigmas = record.sigma_tangential, record.sigma_range
             j = context.owner(record.landmark)
-            return [depth_centre_factor(X(record.keyframe), L(j), record.centre, *sigmas, record.visibility)]
+            return [depth_centre_factor(context.seen_from(record), L(j), record.centre, *sigmas, record.visibility)]
         case Box():
             j = context.owner(record.landmark)
-            keys = X(record.keyframe), L(j), S(j)
+            keys = context.seen_from(record), L(j), S(j)
             box = record.xyxy, record.sides_seen, context.intrinsics, context.R_world_upright, record.sigma_px
             return [box_alignment_factor(*keys, *box)]
         case _:

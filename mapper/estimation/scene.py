@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...factors.visibility import Visibility, VolumePart, measure_visibility
@@ -29,8 +31,11 @@ class Scene:
         """Landmarks, then tracks: the order of `predict`'s targets."""
         return [*self.landmarks.values(), *self.tracks]
 
-    def predict(self, view: View, config: AssociationConfig) -> tuple[Targets, Visibility]:
-        """Where every member should appear in a view, and how much of it the depth map leaves visible."""
+    def predict(self, view: View, config: AssociationConfig, occlusion: bool = True) -> tuple[Targets, Visibility]:
+        """Where every member should appear in a view, and how much of it the depth map leaves visible.
+
+        Without `occlusion` the depth map is not asked: nothing is hidden, and nothing is known to be there or not.
+        """
         members = self.members()
         positions = np.array([m.position for m in members]).reshape(-1, 3)
         log_sizes = np.array([m.log_size for m in members]).reshape(-1, 3)
@@ -39,6 +44,9 @@ class Scene:
         camera = view.T_world_camera, view.R_world_upright
         k = view.frame.intrinsics
         visibility = measure_visibility(view.frame.depth, k, *camera, positions, log_sizes)
+        if not occlusion:
+            none = np.zeros_like(visibility.occluded)
+            visibility = replace(visibility, occluded=none, agreeing=none, free=none, missing=none)
         xyxy, _ = project_volumes(*camera, positions, log_sizes, k)
         clipped = np.clip(xyxy, -0.5, np.array([k.width, k.height, k.width, k.height]) - 0.5)
         visible = visibility.visible[:, WHOLE]

@@ -7,10 +7,10 @@ from typing import Any
 
 import gtsam
 import numpy as np
-from gtsam.symbol_shorthand import L, S, X
+from gtsam.symbol_shorthand import F, L, S, X
 
 from ...datasets.frame import Intrinsics
-from ...factors.odometry import pose3
+from ...factors.odometry import gauge_prior, pose3
 from ..config import SmootherConfig
 from ..map.upright import upright_rotation
 from .beliefs import SizeSite
@@ -19,7 +19,8 @@ from .record_factors import UP, FactorContext, record_factors, site_factor
 
 REBUILD_STEPS = 10  # at most, Gauss-Newton steps after a rebuild, until nothing moves by more than the thresholds
 SNAPSHOT_EVERY = 20  # updates between copies of the estimate from which a rebuild starts
-Owner = tuple[str, int]  # ("record", ledger number) or ("site", landmark): whose factors these are
+FROZEN_SIGMAS = np.full(6, 1e-5)  # rad, m: of poses that objects are seen from but do not move
+Owner = tuple[str, int]  # ("record", ledger number), ("site", landmark) or ("frozen", keyframe): whose factors
 
 
 class Smoother:
@@ -35,6 +36,7 @@ class Smoother:
         self._updates = 0
         self._merged_into: dict[int, int] = {}
         self._measurements: dict[int, list[int]] = {}  # live landmark -> numbers of its records
+        self._frozen: dict[int, gtsam.Pose3] = {}
         self._snapshot = gtsam.Values()
         self._reset()
 
@@ -82,6 +84,8 @@ class Smoother:
         """Appends a measurement to the ledger, and its factors, if it has any, to the graph."""
         factors = self._factors(record)  # before the ledger has it: an impossible measurement raises here
         number = self.ledger.append(record)
+        if isinstance(record, DepthCentre | Box) and not self._config.joint:
+            self._freeze(record.keyframe)
         if isinstance(record, NewLandmark | DepthCentre | Box):
             self._measurements[self.owner(record.landmark)].append(number)
         if factors:
@@ -125,6 +129,12 @@ class Smoother:
         """(M, 4, 4) `T_world_camera` of all keyframes."""
         estimate = self._isam.calculateEstimate()
         return np.array([estimate.atPose3(X(t)).matrix() for t in range(self.keyframes)])
+
+    def pose_covariances(self) -> np.ndarray:
+        """(M, 6, 6) covariances of all keyframe poses, each in its pose's right tangent [rad, m]."""
+        if not self.keyframes:
+            return np.empty((0, 6, 6))
+        return np.array([self.pose_covariance(t) for t in range(self.keyframes)])
 
     def pose_covariance(self, keyframe: int) -> np.ndarray:
         """(6, 6) in the pose's right tangent [rad, m]."""
@@ -209,6 +219,8 @@ class Smoother:
                 self._queue_record(number)
         for landmark in self._measurements:
             self._queue[("site", landmark)] = [site_factor(landmark, self.sites[landmark])]
+        for t, pose in self._frozen.items():
+            self._queue[("frozen", t)] = [gauge_prior(F(t), pose.matrix(), FROZEN_SIGMAS)]
         self._solve(start)
         for _ in range(REBUILD_STEPS):
             if self._isam.update(force_relinearize=True).getVariablesRelinearized() == 0:
@@ -226,6 +238,8 @@ class Smoother:
         for t in range(self.keyframes):
             pose = _finite(sources, X(t), "atPose3", gtsam.Pose3.matrix)
             start.insert(X(t), pose or start.atPose3(X(t - 1)).compose(pose3(motions[t].T_a_b)))
+        for t, pose in self._frozen.items():
+            start.insert(F(t), pose)
         start.insert(UP, _finite(sources, UP, "atUnit3", gtsam.Unit3.point3))
         for landmark, numbers in self._measurements.items():
             first = self.ledger[numbers[0]]
@@ -237,6 +251,16 @@ class Smoother:
         return start
 
     # -- bookkeeping
+
+    def _freeze(self, keyframe: int) -> None:
+        """Makes the fixed copy of a pose, as the camera's own measurements have it now."""
+        if keyframe in self._frozen:
+            return
+        if self._values.exists(X(keyframe)):
+            self.update()
+        pose = self._frozen[keyframe] = self._isam.calculateEstimatePose3(X(keyframe))
+        self._values.insert(F(keyframe), pose)
+        self._queue[("frozen", keyframe)] = [gauge_prior(F(keyframe), pose.matrix(), FROZEN_SIGMAS)]
 
     def _replay(self, record: Record) -> None:
         """Takes over one record of a saved ledger."""
@@ -264,7 +288,8 @@ class Smoother:
 
     def _reset(self) -> None:
         c, params, thresholds = self._config, gtsam.ISAM2Params(), gtsam.ISAM2ThresholdMap()
-        thresholds.insert(("x", np.repeat([c.threshold_rotation, c.threshold_translation], 3)))
+        for pose in "xf":
+            thresholds.insert((pose, np.repeat([c.threshold_rotation, c.threshold_translation], 3)))
         thresholds.insert(("l", np.full(3, c.threshold_position)))
         thresholds.insert(("s", np.full(3, c.threshold_size)))
         thresholds.insert(("u", np.full(2, c.threshold_up)))

@@ -84,6 +84,16 @@ class OutputFolder:
         """The mapper's measurements, from which its graph can be rebuilt."""
         return self.path / "ledger.npz"
 
+    @property
+    def keyframes_file(self) -> Path:
+        """Poses of the keyframes with their covariances."""
+        return self.path / "keyframes.npz"
+
+    @property
+    def snapshot_folder(self) -> Path:
+        """Maps on the way, where they were asked for."""
+        return self.path / "snapshots"
+
     def write_map(self, object_map: ObjectMap, include_doubtful: bool = False) -> None:
         object_map.save(self.map_file, include_doubtful)
 
@@ -108,6 +118,11 @@ class OutputFolder:
             vertices[name] = colors[:, column]
         with replacing(self.cloud_file) as temporary:
             PlyData([PlyElement.describe(vertices, "vertex")], byte_order="<").write(str(temporary))
+
+    def write_keyframes(self, stamps: np.ndarray, T_world_camera: np.ndarray, covariance: np.ndarray) -> None:
+        """(M,) seconds, (M, 4, 4) poses, (M, 6, 6) covariances in the pose's right tangent [rad, m], as an .npz."""
+        with replacing(self.keyframes_file) as temporary, temporary.open("wb") as file:
+            np.savez(file, stamps=stamps, T_world_camera=T_world_camera, covariance=covariance)
 
     def write_config(self, text: str) -> None:
         write_atomic(self.config_file, text.encode())

@@ -96,6 +96,13 @@ class CameraGraph:
         """(N,) stamps and (N, 4, 4) `T_world_camera` of every frame, as estimated now."""
         return self._frames.poses(self.smoother.poses()) if self.started else self._frames.poses(np.empty((0, 4, 4)))
 
+    def keyframes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(M,) stamps, (M, 4, 4) `T_world_camera` and (M, 6, 6) covariances of the keyframes, as estimated now."""
+        if not self.started:
+            return np.empty(0), np.empty((0, 4, 4)), np.empty((0, 6, 6))
+        self.smoother.settle()
+        return self._frames.keyframe_stamps(), self.smoother.poses(), self.smoother.pose_covariances()
+
     def up(self) -> UpDirection:
         """The world's up direction with its uncertainty and the best source that spoke of it (`UP_SOURCES`)."""
         if not self.started:

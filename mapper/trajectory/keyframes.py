@@ -38,6 +38,7 @@ class FrameTrajectory:
 
     def __init__(self) -> None:
         self._stamps: list[float] = []
+        self._keyframe_stamps: list[float] = []
         self._keyframe: list[int] = []
         self._T_keyframe_camera: list[np.ndarray] = []
         self._T_odometry_keyframe = np.eye(4)
@@ -49,11 +50,16 @@ class FrameTrajectory:
         """Adds a frame seen from (or being) keyframe number `keyframe`; returns (4, 4) `T_keyframe_camera`."""
         if is_keyframe:
             self._T_odometry_keyframe = T_odometry_camera
+            self._keyframe_stamps.append(stamp)
         T = inverse(self._T_odometry_keyframe) @ T_odometry_camera
         self._stamps.append(stamp)
         self._keyframe.append(keyframe)
         self._T_keyframe_camera.append(T)
         return T
+
+    def keyframe_stamps(self) -> np.ndarray:
+        """(M,) seconds: when each keyframe was taken."""
+        return np.array(self._keyframe_stamps)
 
     def poses(self, T_world_keyframe: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(N,) stamps and (N, 4, 4) `T_world_camera` under the given (M, 4, 4) keyframe poses."""

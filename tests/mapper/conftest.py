@@ -125,6 +125,10 @@ class FakeMapper:
         poses[:, 0, 3] = self.frames
         return np.array(self.stamps), poses
 
+    def keyframes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        stamps, poses = self.trajectory()
+        return stamps[::2], poses[::2], np.tile(0.01 * np.eye(6), (len(stamps[::2]), 1, 1))
+
     def cloud(self) -> tuple[np.ndarray, np.ndarray]:
         count = len(self.frames)
         return np.arange(3.0 * count).reshape(-1, 3), np.full((count, 3), 7, dtype=np.uint8)

@@ -18,6 +18,7 @@ from thingmap.detectors.detections import Detections
 from thingmap.mapper.cli.main import app
 from thingmap.mapper.config import MapperConfig, OdometrySource
 from thingmap.mapper.config_file import load_config
+from thingmap.mapper.map.object_map import ObjectMap
 from thingmap.mapper.map.store import OutputFolder
 
 
@@ -85,6 +86,29 @@ def test_a_run_leaves_everything_in_its_folder(world, tmp_path):
     assert report["frames_used"] == 5 and report["stopped"] is None
     assert "thing-0005" in result.stdout and "0.100±0.010" in result.stdout
     assert "5 things from 5 frames" in result.stdout
+
+
+def test_snapshots_are_maps_on_the_way_with_doubtful_things(world, tmp_path):
+    out = tmp_path / "out"
+    result = thingmap("run", "desk", "-o", out, "--detector", "none", "--snapshots", "1,3,99")
+    assert result.exit_code == 0, result.output
+    index = json.loads((out / "snapshots" / "index.json").read_text())
+    assert [(entry["frames"], entry["stamp"]) for entry in index["snapshots"]] == [
+        (1, world.sequence[0].stamp),
+        (3, world.sequence[2].stamp),
+    ]
+    entry = index["snapshots"][1]
+    assert np.array(entry["T_world_camera"])[0, 3] == 2.0  # the fake camera walks along x
+    kept = ObjectMap.load(out / "snapshots" / entry["file"])
+    assert len(kept) == 4 and min(thing.existence for thing in kept.things) == 0.2
+
+    thingmap("run", "desk", "-o", out, "--detector", "none", "--overwrite")
+    assert json.loads((out / "snapshots" / "index.json").read_text())["snapshots"] == []
+
+
+def test_snapshots_of_no_number_are_refused(world, tmp_path):
+    result = thingmap("run", "desk", "-o", tmp_path / "out", "--detector", "none", "--snapshots", "3;7")
+    assert_mistake(result, "--snapshots", "3;7")
 
 
 def test_progress_without_a_terminal_is_a_few_lines(world, tiny_sequence, tmp_path):

@@ -220,7 +220,7 @@ class Stage:
         """One keyframe, from the view to retirement."""
         view = self.view(x, *things, pull=pull)
         lifted, _ = lift(self.detect(view, things), view.frame, self.config.lifting)
-        targets, visibility = self.scene.predict(view, self.config.association)
+        targets, visibility = self.scene.predict(view, self.config.association, self.models.occlusion)
         scores = score_evidence(lifted, self.models.appearance)
         evidence = class_evidence(scores, self.scene.members())
         camera = view.T_world_camera, view.R_world_upright
