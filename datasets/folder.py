@@ -6,6 +6,7 @@
                                  "depth_scale": 1000, "fps": 30, "gravity": [0, 0, -1]}; the last two are optional
     poses.txt                   optional, rows `stamp tx ty tz qx qy qz qw`, camera to world
     accelerometer.txt           optional, rows `stamp ax ay az`, camera axes (x right, y down, z forward), m/s^2
+    truth/                      optional, what is known of the scene (see `truth_files`): `thingmap synth` writes it
 
 NAME is the same for colour and depth; frames are in natural order (2 before 10). Where every NAME is a number with a
 decimal point it is the frame's stamp in seconds, else frame i is at i / fps. `depth_scale` is the value of a depth of
@@ -21,11 +22,13 @@ import numpy as np
 
 from .camera_files import CameraFile, read_camera_json
 from .errors import InputError
+from .folder_truth import with_truth
 from .frame import BrokenFrame, FrameProblem
 from .images import DepthUnit, FrameFiles, read_frame_images
 from .poses import read_poses_at, read_tum_pose_rows
 from .recorded import RecordedSequence, natural_key
 from .stamps import read_specific_force
+from .truth_files import FOLDER as TRUTH
 
 LAYOUT = "color/, depth/ and intrinsics.json"
 
@@ -48,7 +51,7 @@ def open_folder(path: Path) -> RecordedSequence:
     """Opens the folder. A frame counts where either of its images exists; with only one of them it is broken.
 
     Poses are matched by stamp (see `StampedPoses.at`; a frame without one is usable), or, where the names are not
-    stamps, row i belongs to frame i.
+    stamps, row i belongs to frame i. With `truth/` the sequence is a `FolderWithTruth`.
 
     Raises:
         InputError: a part is missing or is not as above; it says which and what to do.
@@ -70,7 +73,7 @@ def open_folder(path: Path) -> RecordedSequence:
     if camera.gravity is not None and poses is None:
         remedy = "add poses.txt, or remove gravity"
         raise InputError(path / "intrinsics.json", "gravity in the world of the poses", "no poses.txt", remedy)
-    return RecordedSequence(
+    sequence = RecordedSequence(
         path=path,
         name=path.resolve().name,
         files=files,
@@ -82,6 +85,7 @@ def open_folder(path: Path) -> RecordedSequence:
         specific_force=read_specific_force(path / "accelerometer.txt", stamps),
         pose_problems={} if stamped or poses is None else _rows_without_pose(poses),
     )
+    return with_truth(sequence, path / TRUTH) if (path / TRUTH).is_dir() else sequence
 
 
 def _images(folder: Path, suffixes: tuple[str, ...]) -> dict[str, Path]:

@@ -10,7 +10,7 @@ import numpy as np
 from .errors import UserError
 from .frame import BrokenFrame, Frame, Intrinsics
 from .sequence import Sequence
-from .truth import FrameTruth, HasTruth, TrueObject
+from .truth import FrameTruth, HasClutter, HasInstances, HasPointTruth, HasTruth, TrueObject
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,15 +81,33 @@ class Subset:
 
 @dataclass(frozen=True, eq=False)
 class TruthSubset(Subset):
-    """A subset of a sequence whose objects are known (`HasTruth`)."""
+    """A subset of a sequence whose objects are known (`HasTruth`).
+
+    Where the whole sequence is `HasClutter`, `HasInstances` or `HasPointTruth`, so is the subset; its scene and its
+    cloud are those of the whole.
+    """
 
     objects: tuple[TrueObject, ...]
     classes: tuple[str, ...]
     whole_truth: Callable[[int], FrameTruth]
 
+    def __post_init__(self) -> None:
+        # Attributes of the instance, because a method of the class would promise what the whole may not have.
+        whole = self.sequence
+        if isinstance(whole, HasClutter):
+            object.__setattr__(self, "clutter", whole.clutter)
+        if isinstance(whole, HasInstances):
+            object.__setattr__(self, "instances", self._instances)
+        if isinstance(whole, HasPointTruth):
+            object.__setattr__(self, "point_truth", whole.point_truth)
+
     def truth(self, index: int) -> FrameTruth:
         """What can be seen of every object in the frame at `index` of the subset."""
         return self.whole_truth(self.indices[index])
+
+    def _instances(self, index: int) -> np.ndarray:
+        assert isinstance(self.sequence, HasInstances)
+        return self.sequence.instances(self.indices[index])
 
 
 def subset(sequence: Sequence, stride: int = 1, max_frames: int | None = None) -> Sequence:

@@ -68,7 +68,7 @@ def unit(vector: np.ndarray) -> np.ndarray:
 
 def whole_of(sequence: object) -> object:
     """The whole sequence behind a view of it (see `datasets.views`), so that all views see the same spots."""
-    while not isinstance(sequence, HasClutter) and hasattr(sequence, "sequence"):
+    while hasattr(sequence, "sequence"):
         sequence = sequence.sequence  # pyright: ignore[reportAttributeAccessIssue]
     return sequence
 

@@ -1,3 +1,4 @@
+import pickle
 from collections.abc import Iterator
 
 import numpy as np
@@ -6,7 +7,15 @@ import pytest
 from thingmap.datasets.errors import UserError
 from thingmap.datasets.frame import BrokenFrame, Frame, FrameProblem, Intrinsics
 from thingmap.datasets.sequence import Sequence
-from thingmap.datasets.truth import FrameTruth, HasTruth, TrueObject
+from thingmap.datasets.truth import (
+    FrameTruth,
+    HasClutter,
+    HasInstances,
+    HasPointTruth,
+    HasTruth,
+    PointTruth,
+    TrueObject,
+)
 from thingmap.datasets.views import subset, usable_frames
 
 
@@ -82,6 +91,30 @@ def test_truth_follows_the_frames_where_there_is_any() -> None:
     assert (part.objects, part.classes) == (TenWithTruth.objects, ("mug",))
     assert [part.truth(i).object_id[0] for i in range(4)] == [0, 3, 6, 9]
     assert not isinstance(subset(Ten(), 3), HasTruth)
+
+
+class TenWithEverything(TenWithTruth):
+    clutter = (TrueObject(1, "book", np.zeros(3), np.ones(3), 0.0),)
+
+    def instances(self, index: int) -> np.ndarray:
+        return np.full((3, 4), index, dtype=np.int32)
+
+    def point_truth(self) -> PointTruth:
+        return PointTruth(np.zeros((2, 3), np.float32), np.array([0, -1]), None)
+
+
+def test_all_truth_is_forwarded_and_none_is_invented() -> None:
+    whole = TenWithEverything()
+    for part in (subset(whole, 3), pickle.loads(pickle.dumps(subset(whole, 3)))):
+        assert isinstance(part, HasClutter) and isinstance(part, HasInstances) and isinstance(part, HasPointTruth)
+        assert [thing.label for thing in part.clutter] == ["book"]
+        assert [int(part.instances(k)[0, 0]) for k in (0, 1, 3, -1)] == [0, 3, 9, 9]
+        np.testing.assert_array_equal(part.point_truth().class_id, [0, -1])
+        with pytest.raises(IndexError):
+            part.instances(4)
+    for protocol in (HasClutter, HasInstances, HasPointTruth):
+        assert not isinstance(subset(TenWithTruth(), 3), protocol)
+        assert not isinstance(subset(Ten(), 3), protocol)
 
 
 @pytest.mark.parametrize(("stride", "most"), [(0, None), (-1, None), (1, 0)])
