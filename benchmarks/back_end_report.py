@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from alignment import align_positions, trajectory_error
 from back_end import BackEnd
 from back_end_views import SimulatedView, simulate
 from back_end_world import CLASSES, make_world
@@ -15,6 +14,7 @@ from results import table
 
 from thingmap.mapper.config import MapperConfig
 from thingmap.mapper.estimation.outcomes import Outcome
+from thingmap.mapper.evaluation.inputs.alignment import align_positions, trajectory_error
 
 SEEN = 10  # keyframes with a detection, after which an object should be in the map
 LAST = 100  # keyframes over which times are taken

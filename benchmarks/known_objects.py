@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from alignment import Alignment
 
 from thingmap.datasets.errors import InputError
+from thingmap.mapper.evaluation.inputs.case import Alignment
 from thingmap.mapper.map.thing import Thing
 
 MIN_EXISTENCE = 0.9  # of a thing that stands for a listed object

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from alignment import Alignment, align_poses, align_positions, trajectory_error
 from known_objects import BELIEVED, MIN_EXISTENCE, Check
 from results import table
 
+from thingmap.mapper.evaluation.inputs.alignment import align_poses, align_positions, trajectory_error
+from thingmap.mapper.evaluation.inputs.case import Alignment
 from thingmap.mapper.map.object_map import ObjectMap
 from thingmap.mapper.run_report import RunReport
 

@@ -35,12 +35,16 @@ class PlotKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """One number: a stable `name` ("joint F1"), its value (None: undefined here), unit ("" for shares)."""
+    """One number: a stable `name` ("joint F1"), its value (None: undefined here), unit ("" for shares).
+
+    What only helps to read another number is no `headline`: reports and comparisons hold it, summaries do not show it.
+    """
 
     name: str
     value: float | int | None
     unit: str = ""
     better: Better = Better.HIGHER
+    headline: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from alignment import Alignment
 from known_objects import KnownObject, check_things, read_known_objects
 
 from thingmap.datasets.errors import InputError
+from thingmap.mapper.evaluation.inputs.case import Alignment
 from thingmap.mapper.map.thing import Evidence, Thing
 
 SAME_AXES = Alignment(np.eye(3), np.zeros(3))

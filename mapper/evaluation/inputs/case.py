@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ...datasets.ground_truth import GroundTruth
-from ...detectors.detections import Detections
-from ..map.object_map import ObjectMap
-from ..map.thing import Thing
-from .config import EvaluationConfig
+from ....datasets.ground_truth import GroundTruth
+from ....detectors.detections import Detections
+from ...map.object_map import ObjectMap
+from ...map.thing import Thing
+from ...map.upright import upright_rotation
+from ..config import EvaluationConfig
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,8 +55,9 @@ class MappedRun:
         report: `report.json`.
         snapshots: maps on the way, by growing number of frames; often none.
         keyframes: keyframe poses with covariances; None where the run wrote none.
-        cloud: the cloud, (M, 3) metres in the map's frame, and (M,) labels of its points where the run labelled them,
-            else None; raises `InputError` where there is no cloud.
+        cloud: the cloud, (M, 3) metres in the map's frame, and (M,) int64 labels of its points where the run labelled
+            them, else None: indices into `object_map.classes`, `NO_OBJECT` for what is none of them. Raises
+            `InputError` where there is no cloud.
     """
 
     folder: Path
@@ -70,11 +72,14 @@ class MappedRun:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Alignment:
-    """p -> R p + t from the map's axes to the truth's; `method` says how it was found ("SE(3) by positions", ...)."""
+    """p -> R p + t from the map's axes to the truth's; `method` says how it was found ("SE(3) by positions", ...).
+
+    `R` is (3, 3), `t` (3,) metres.
+    """
 
     R: np.ndarray
     t: np.ndarray
-    method: str
+    method: str = ""
 
     def apply(self, points: np.ndarray) -> np.ndarray:
         """(3,) or (N, 3) points in the truth's axes, metres."""
@@ -86,20 +91,34 @@ class Alignment:
         T[:3, :3], T[:3, 3] = self.R, self.t
         return T @ T_map_camera
 
+    def angle_to(self, other: Alignment) -> float:
+        """Angle between two alignments' rotations, rad."""
+        cosine = (np.trace(self.R.T @ other.R) - 1.0) / 2.0
+        return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedThing:
-    """A thing of the map in the truth's axes: centre (3,) metres, yaw about the truth's up, `label` in its words."""
+    """A thing of the map in the truth's axes: centre (3,) metres, yaw about the truth's up, `label` in its words.
+
+    `yaw` is radians from the x axis of `Case.R_truth_upright`. `probability` is P(label | it exists): that of the
+    thing's own label, and of those others that mean the same in the truth's words; None for the former alone.
+    """
 
     thing: Thing
     label: str
     position: np.ndarray
     yaw: float
+    probability: float = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        if self.probability is None:
+            object.__setattr__(self, "probability", self.thing.probability)
 
     @property
     def belief(self) -> float:
         """P(it exists and is a `label`)."""
-        return self.thing.existence * self.thing.probability
+        return self.thing.existence * self.probability
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,6 +135,7 @@ class Case:
         things: of the final map, in the truth's axes and words; things whose label the truth does not know are absent.
         detections: of frames of the truth, by index, from the detector under test; None where there is none.
         config: every number of the evaluator.
+        notes: what a reader of all numbers must know, such as things that were left out.
     """
 
     run: MappedRun
@@ -127,8 +147,28 @@ class Case:
     things: tuple[PlacedThing, ...]
     detections: Callable[[int], Detections] | None
     config: EvaluationConfig
+    notes: tuple[str, ...] = ()
+
+    @property
+    def up(self) -> np.ndarray:
+        """(3,) unit vector up in the truth's axes: the truth's own, or the map's where the truth does not know."""
+        return self.alignment.R @ self.run.object_map.up.direction if self.truth.up is None else self.truth.up
+
+    @property
+    def R_truth_upright(self) -> np.ndarray:
+        """(3, 3) axes in which boxes stand upright in the truth, as `upright_rotation`; `box_corners` takes it."""
+        return upright_rotation(self.up)
 
     def to_truth_label(self, label: str) -> str | None:
         """A label of the map in the truth's words; None for a class that the truth does not know."""
-        wanted = self.config.aliases.get(label, label).casefold()
-        return next((name for name in self.truth.classes if name.casefold() == wanted), None)
+        return in_truth_words(label, self.truth.classes, self.config.aliases)
+
+
+def in_truth_words(label: str, classes: tuple[str, ...], aliases: Mapping[str, str]) -> str | None:
+    """What `label` of a map is called among the truth's `classes`, by `aliases` or by itself; None where it is not.
+
+    Upper and lower case are the same.
+    """
+    meant = {name.casefold(): other.casefold() for name, other in aliases.items()}
+    wanted = meant.get(label.casefold(), label.casefold())
+    return next((name for name in classes if name.casefold() == wanted), None)

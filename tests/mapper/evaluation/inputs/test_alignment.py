@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from alignment import align_poses, align_positions, trajectory_error
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from thingmap.datasets.errors import UserError
+from thingmap.mapper.evaluation.inputs.alignment import (
+    align_poses,
+    align_positions,
+    align_similarity,
+    anchor,
+    trajectory_error,
+)
 
 ALIGNMENTS = (align_positions, align_poses)
 
@@ -89,3 +95,39 @@ def test_poses_that_do_not_pair_are_refused(align) -> None:
     broken[2, 0, 0] = np.nan
     with pytest.raises(UserError, match="finite"):
         align(broken, random_poses(1))
+
+
+@given(st.integers(0, 10_000), st.floats(0.2, 5.0))
+def test_a_similarity_recovers_a_known_scale(seed: int, scale: float) -> None:
+    estimate, motion = random_poses(seed), random_poses(seed + 1, 1)[0]
+    scaled = estimate.copy()
+    scaled[:, :3, 3] *= scale
+    rigid, found = align_similarity(estimate, motion @ scaled)
+    assert found == pytest.approx(scale)
+    np.testing.assert_allclose(rigid.R, motion[:3, :3], atol=1e-9)
+    np.testing.assert_allclose(rigid.t, motion[:3, 3], atol=1e-9)
+
+
+@given(st.integers(0, 10_000))
+def test_a_free_scale_never_makes_it_worse(seed: int) -> None:
+    estimate = random_poses(seed)
+    truth = disturbed(estimate, seed)
+    rigid, scale = align_similarity(estimate, truth)
+    scaled = estimate.copy()
+    scaled[:, :3, 3] *= scale
+    best = trajectory_error(estimate, truth, align_positions(estimate, truth))
+    assert trajectory_error(scaled, truth, rigid) <= best + 1e-12
+
+
+def test_an_anchor_makes_the_first_pose_the_same_whatever_follows() -> None:
+    estimate = random_poses(8)
+    truth = random_poses(9, 1)[0] @ disturbed(estimate, 8)
+    np.testing.assert_allclose(anchor(estimate, truth).pose(estimate[0]), truth[0], atol=1e-12)
+    assert trajectory_error(estimate, truth, anchor(estimate, truth)) > 0.05
+
+
+def test_one_pose_is_enough_to_align_by_poses() -> None:
+    estimate, truth = random_poses(10, 1), random_poses(11, 1)
+    np.testing.assert_allclose(align_poses(estimate, truth).pose(estimate[0]), truth[0], atol=1e-12)
+    with pytest.raises(UserError, match="N >= 3"):
+        align_positions(estimate, truth)

@@ -1,0 +1,1 @@
+"""Boxes in images: things projected, boxes matched, curves drawn."""

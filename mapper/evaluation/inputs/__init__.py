@@ -1,0 +1,1 @@
+"""What protocols are given: a finished run, the truth, and how the two lie to each other."""

@@ -1,0 +1,189 @@
+"""The output folder of a run, read for the evaluator.
+
+map.json  trajectory.txt  report.json    as `thingmap run` writes them
+cloud.ply                                the cloud, read when it is asked for
+labels.ply                               optional, takes the place of cloud.ply: a cloud whose vertices have an
+                                         integer `label` (or `class`). Comment lines `label 3 "cup"` say what a
+                                         number means, as in exported PLYs; what they do not name is nothing.
+                                         Without them it is an index into the classes of map.json, negative for
+                                         nothing.
+snapshots/index.json  snapshots/*.json   optional, maps on the way (`thingmap run --snapshots`)
+keyframes.npz                            optional, stamps (M,), T_world_camera (M, 4, 4) and covariance (M, 6, 6)
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+
+from ....datasets.errors import InputError
+from ....datasets.poses import nearest_rotations, read_tum_poses
+from ....datasets.truth import NO_OBJECT
+from ...map.object_map import ObjectMap
+from ...map.record import Record
+from ...map.store import AGAIN, OutputFolder
+from .case import KeyframePoses, MappedRun, Snapshot
+
+LABELS_FILE = "labels.ply"
+SNAPSHOT_INDEX = "index.json"
+SNAPSHOT_SCHEMA = "thingmap-snapshots/1"
+SYMMETRY = 1e-6  # of a covariance, relative to its largest value
+
+
+def load_run(out: str | Path) -> MappedRun:
+    """Everything that the evaluator reads of a run.
+
+    Raises:
+        InputError: the folder holds no map, or one of its files is not what it should be.
+    """
+    folder = OutputFolder.open(out)
+    object_map = folder.read_map()
+    trajectory = read_tum_poses(folder.trajectory_file)
+    if len(trajectory.stamps) == 0:
+        raise InputError(folder.trajectory_file, "the pose of a frame", "none", AGAIN)
+    report = folder.read_report()
+    if not isinstance(report, dict):
+        raise InputError(folder.report_file, "a report in JSON", type(report).__name__, AGAIN)
+    return MappedRun(
+        folder=folder.path,
+        object_map=object_map,
+        stamps=trajectory.stamps,
+        poses=trajectory.matrices,
+        report=report,
+        snapshots=_read_snapshots(folder.snapshot_folder),
+        keyframes=_read_keyframes(folder.keyframes_file) if folder.keyframes_file.is_file() else None,
+        cloud=cache(lambda: _read_cloud(folder, object_map)),
+    )
+
+
+def _read_snapshots(folder: Path) -> tuple[Snapshot, ...]:
+    """By growing number of frames; none where there is no index."""
+    index = folder / SNAPSHOT_INDEX
+    if not index.is_file():
+        return ()
+    try:
+        root = Record(json.loads(index.read_text(encoding="utf-8")), index)
+    except (OSError, ValueError) as error:
+        raise InputError(index, "an index of snapshots in JSON", str(error), AGAIN) from None
+    if root.text("schema") != SNAPSHOT_SCHEMA:
+        remedy = "open it with the version of thingmap that wrote it"
+        raise InputError(index, f'the schema "{SNAPSHOT_SCHEMA}"', repr(root.text("schema")), remedy)
+    snapshots = sorted((_read_snapshot(index, r) for r in root.records("snapshots")), key=lambda s: s.frames)
+    for one, other in pairwise(snapshots):
+        if one.frames == other.frames:
+            raise InputError(index, "one snapshot for a number of frames", f"two after {one.frames} frames", AGAIN)
+    return tuple(snapshots)
+
+
+def _read_snapshot(index: Path, record: Record) -> Snapshot:
+    name = record.text("file")
+    if Path(name).name != name:
+        raise InputError(index, "names of files beside it", repr(name), AGAIN)
+    pose = _valid_poses(index, f"snapshot {name}", record.array("T_world_camera", (4, 4))[None])[0]
+    return Snapshot(record.count("frames"), record.number("stamp"), pose, ObjectMap.load(index.parent / name))
+
+
+def _read_keyframes(file: Path) -> KeyframePoses:
+    try:
+        with np.load(file, allow_pickle=False) as content:
+            names = ("stamps", "T_world_camera", "covariance")
+            stamps, poses, covariances = (np.asarray(content[name], dtype=np.float64) for name in names)
+    except KeyError as error:
+        raise InputError(file, "arrays stamps, T_world_camera and covariance", str(error), AGAIN) from None
+    except (OSError, ValueError, TypeError, EOFError, AttributeError, BadZipFile) as error:
+        raise InputError(file, "keyframes as an .npz archive", str(error), AGAIN) from None
+    count, shapes = len(np.atleast_1d(stamps)), (stamps.shape, poses.shape, covariances.shape)
+    if shapes != ((count,), (count, 4, 4), (count, 6, 6)):
+        raise InputError(file, "shapes (M,), (M, 4, 4) and (M, 6, 6)", ", ".join(map(str, shapes)), AGAIN)
+    if not np.isfinite(stamps).all():
+        raise InputError(file, "finite stamps", "others", AGAIN)
+    for k, covariance in enumerate(covariances):
+        if not _is_covariance(covariance):
+            found = f"something else for keyframe {k}"
+            raise InputError(file, "symmetric covariances without negative eigenvalue", found, AGAIN)
+    return KeyframePoses(stamps, _valid_poses(file, "keyframe {}", poses), covariances)
+
+
+def _valid_poses(file: Path, what: str, poses: np.ndarray) -> np.ndarray:
+    """(N, 4, 4) poses with exact rotations; `what` names one in errors."""
+    valid, problems = nearest_rotations(poses)
+    for row, problem in problems.items():
+        raise InputError(file, "poses as 4 x 4 matrices", f"{what.format(row)}: {problem}", AGAIN)
+    return valid
+
+
+def _is_covariance(matrix: np.ndarray) -> bool:
+    if not np.isfinite(matrix).all():
+        return False
+    tolerance = SYMMETRY * np.abs(matrix).max()
+    return bool(np.abs(matrix - matrix.T).max() <= tolerance and np.linalg.eigvalsh(matrix)[0] >= -tolerance)
+
+
+def _read_cloud(folder: OutputFolder, object_map: ObjectMap) -> tuple[np.ndarray, np.ndarray | None]:
+    labelled = folder.path / LABELS_FILE
+    if labelled.is_file():
+        return _read_labels(labelled, object_map)
+    return folder.read_cloud()[0], None
+
+
+def _read_labels(file: Path, object_map: ObjectMap) -> tuple[np.ndarray, np.ndarray]:
+    """(M, 3) metres and (M,) int64 indices into the map's classes, `NO_OBJECT` for none."""
+    from plyfile import PlyData, PlyParseError
+
+    try:
+        content = PlyData.read(str(file))
+        vertices = content["vertex"].data
+        points = np.stack([vertices[axis] for axis in "xyz"], axis=1).astype(np.float64)
+        field = next(name for name in ("label", "class") if name in (vertices.dtype.names or ()))
+        numbers = vertices[field]
+    except StopIteration:
+        found = "no such property"
+        raise InputError(file, "an integer `label` for every vertex", found, "add it, or remove the file") from None
+    except (OSError, KeyError, ValueError, PlyParseError) as error:
+        raise InputError(file, "a labelled cloud in PLY", str(error), "write it again, or remove it") from None
+    if numbers.dtype.kind not in "iu":
+        raise InputError(file, f"an integer `{field}`", f"type {numbers.dtype}", "write it as int, or remove the file")
+    named = _named_labels(file, [*content.comments, *content["vertex"].comments], object_map)
+    numbers = numbers.astype(np.int64)
+    if named:
+        codes, inverse = np.unique(numbers, return_inverse=True)
+        return points, np.array([named.get(int(code), NO_OBJECT) for code in codes], dtype=np.int64)[inverse]
+    if len(numbers) and numbers.max() >= len(object_map.classes):
+        expected = f"`{field}` below {len(object_map.classes)}, the number of the map's classes"
+        remedy = 'say what the labels mean in comment lines such as `label 3 "cup"`'
+        raise InputError(file, expected, str(numbers.max()), remedy)
+    return points, np.where(numbers < 0, NO_OBJECT, numbers)
+
+
+def _named_labels(file: Path, comments: list[str], object_map: ObjectMap) -> dict[int, int]:
+    """Number in the file -> index into the map's classes, from comment lines `label 3 "cup"`."""
+    index = {name.casefold(): k for k, name in enumerate(object_map.classes)}
+    named: dict[int, int] = {}
+    for line in comments:
+        words = line.split(maxsplit=2)
+        if len(words) != 3 or words[0] != "label":
+            continue
+        try:
+            number, name = int(words[1]), _text(json.loads(words[2]))
+        except ValueError:
+            remedy = 'write lines such as `comment label 3 "cup"`'
+            raise InputError(file, "a number and a name in quotes", repr(line), remedy) from None
+        if name.casefold() not in index:
+            known = ", ".join(object_map.classes)
+            raise InputError(
+                file, f"classes of the map ({known})", repr(name), "label the cloud with the map's classes"
+            )
+        named[number] = index[name.casefold()]
+    return named
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError(f"{value!r} is no text")
+    return value

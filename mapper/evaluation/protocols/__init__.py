@@ -1,0 +1,1 @@
+"""One module a protocol; each documents the paper section that it follows."""

@@ -1,0 +1,1 @@
+"""Things matched with true objects, and how they differ."""

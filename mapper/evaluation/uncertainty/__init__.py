@@ -1,0 +1,1 @@
+"""Probabilities and covariances against what is true."""
