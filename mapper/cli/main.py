@@ -12,11 +12,14 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from .compare import compare
 from .detect import detect
+from .evaluate import evaluate
 from .export import export
 from .info import info
 from .query import query
 from .run import run
+from .synth import synth
 
 # What the parser raises for a bad option; typer carries its own copy of click since 0.26 and shows only this subclass.
 UsageProblem: type[Exception] = next(cls for cls in typer.BadParameter.__mro__ if cls.__name__ == "ClickException")
@@ -71,7 +74,7 @@ app = typer.Typer(
     add_completion=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, detect, query, export, info):
+for command in (run, detect, query, export, info, evaluate, compare, synth):
     app.command()(command)
 
 
