@@ -1,4 +1,4 @@
-"""One way in: a path or the name of a sample becomes a sequence."""
+"""One way in: a path, the name of a sample or the line of a synthetic world becomes a sequence."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from .sequence import Sequence
 from .views import subset
 
 SAMPLE_PREFIX = "sample:"
+SYNTH_PREFIX = "synth:"
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,22 +50,26 @@ DATASETS = tuple(dict.fromkeys(loader.dataset for loader in LOADERS))
 def open_sequence(
     spec: str | Path, dataset: str | None = None, stride: int = 1, max_frames: int | None = None
 ) -> Sequence:
-    """Opens a recorded sequence or a bundled sample.
+    """Opens a recorded sequence, a bundled sample or a synthetic world.
 
     Args:
-        spec: a folder, or `sample:NAME`.
+        spec: a folder, `sample:NAME`, or `synth:PRESET` with parameters as `synthetic.synth.parse_synth` reads them.
         dataset: one of `DATASETS`; None to tell by the files in the folder.
         stride: take every n-th frame.
         max_frames: take at most so many of those; None for all.
 
     Raises:
         InputError: there is no such folder, nothing in it is recognised, or it holds several sequences.
-        UserError: an argument is wrong, or there is no such sample.
+        UserError: an argument is wrong, or there is no such sample or synthetic world.
     """
     if str(spec).startswith(SAMPLE_PREFIX):
         from .synthetic.sample import open_sample  # the renderer is slow to import, and recordings do not need it
 
         return subset(open_sample(str(spec).removeprefix(SAMPLE_PREFIX)), stride, max_frames)
+    if str(spec).startswith(SYNTH_PREFIX):
+        from .synthetic.synth import open_synth  # slow to import, too
+
+        return subset(open_synth(str(spec)), stride, max_frames)
     loader, path = _choose(Path(spec).expanduser(), dataset)
     return subset(loader.open(path), stride, max_frames)
 
@@ -76,7 +81,7 @@ def _choose(path: Path, dataset: str | None) -> tuple[Loader, Path]:
     if not path.is_dir():
         found = "a file" if path.exists() else "no such folder"
         expected = f"the folder of a sequence ({dataset or ', '.join(DATASETS)})"
-        raise InputError(path, expected, found, f"check the path, or use {SAMPLE_PREFIX}NAME")
+        raise InputError(path, expected, found, f"check the path, or use {SAMPLE_PREFIX}NAME or {SYNTH_PREFIX}PRESET")
     candidates = [(loader, place) for loader in loaders for place in loader.find(path)]
     if len(candidates) == 1:
         return candidates[0]

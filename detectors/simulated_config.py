@@ -49,6 +49,10 @@ class SimulatedDetectorConfig:
     min_score: float = 0.05
     confusions: tuple[tuple[str, str, float], ...] = (
         ("cup", "bowl", 0.14),
+        ("coffee mug", "bowl", 0.12),
+        ("coffee mug", "soda can", 0.10),
+        ("flashlight", "bottle", 0.12),
+        ("flashlight", "soda can", 0.05),
         ("soda can", "bottle", 0.12),
         ("soda can", "cup", 0.10),
         ("cap", "bowl", 0.10),

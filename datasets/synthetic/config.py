@@ -7,8 +7,8 @@ from enum import StrEnum
 from pathlib import Path
 
 from ..errors import UserError
-from .camera import ColorCamera
-from .sensor import DepthSensor
+from .rendering.camera import ColorCamera
+from .rendering.sensor import DepthSensor
 
 
 class Preset(StrEnum):

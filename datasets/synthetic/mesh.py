@@ -116,7 +116,7 @@ def tube(path: np.ndarray, radius: float, sides: int = 12) -> Mesh:
     normals = np.cos(angle)[None, :, None] * outward[:, None] + np.sin(angle)[None, :, None] * np.array([0.0, 1.0, 0.0])
     centres = np.stack([path[:, 0], np.zeros(len(path)), path[:, 1]], axis=1)
     bent = sheet(centres[:, None] + radius * normals)
-    return Mesh(bent.vertices, normals.reshape(-1, 3), bent.uv, bent.triangles)
+    return Mesh(bent.vertices, normals.reshape(-1, 3), bent.uv, bent.triangles[:, ::-1])  # wound as seen from outside
 
 
 FACES = {  # normal, u direction, v direction

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from urllib.parse import parse_qsl
 
 import numpy as np
 
 from ..errors import UserError
-from ..frame import Frame, Intrinsics
-from ..truth import FrameTruth, TrueObject
-from .camera import ColorCamera, develop
-from .paths import OrbitConfig, Sway, hand_held
-from .render import Cast, Renderer
-from .sensor import DepthSensor, measure
-from .silhouettes import Silhouettes
+from .motion.orbit import OrbitConfig, hand_held
+from .rendering.camera import ColorCamera
+from .rendering.render import Lights
+from .rendering.sensor import DepthSensor
+from .scene import Scene
+from .sequence import RenderedSequence
 from .world import CLASSES, MAX_OBJECTS, build_world
 
 RATE = 30.0  # Hz
-KEPT_CASTS = 4  # of about 5 MB; the truth of a frame then costs no second cast
+STEADY_WHITE = ColorCamera(white_drift=0.0)
 LIMITS = {"seed": (0, 2**31 - 1), "objects": (1, MAX_OBJECTS), "frames": (1, 3000), "width": (64, 1280)}
 
 
@@ -34,7 +32,7 @@ class TabletopConfig:
         width: pixels, even; images are 4:3 with the field of view of f = 525 at 640 x 480.
         orbit: how the camera moves.
         sensor: the depth sensor.
-        camera: the colour camera.
+        camera: the colour camera; its white balance holds still.
 
     Raises:
         UserError: a number outside its limits.
@@ -46,7 +44,7 @@ class TabletopConfig:
     width: int = 640
     orbit: OrbitConfig = field(default_factory=OrbitConfig)
     sensor: DepthSensor = field(default_factory=DepthSensor)
-    camera: ColorCamera = field(default_factory=ColorCamera)
+    camera: ColorCamera = STEADY_WHITE
 
     def __post_init__(self) -> None:
         for name, (low, high) in LIMITS.items():
@@ -57,92 +55,28 @@ class TabletopConfig:
             raise UserError(f"sample:tabletop: expected a width divisible by 4, found {self.width}; change it")
 
 
-class TabletopSequence:
-    """Mugs, bowls, cans and more on a table, seen by a hand-held depth camera. See `Sequence` and `HasTruth`.
-
-    A frame is rendered when it is asked for and depends on the configuration and its index only. World axes: z up,
-    floor at z = 0. `poses` are ground truth; `gravity` is None, so that up has to be estimated.
-
-    Attributes:
-        clutter: things on the table that belong to none of `classes`; they are not in `objects`.
-    """
+class TabletopSequence(RenderedSequence):
+    """Mugs, bowls, cans and more on a table, seen by a hand-held depth camera."""
 
     def __init__(self, config: TabletopConfig = TabletopConfig()) -> None:
         self.config = config
-        self.name = "sample:tabletop" + _changed(config)
-        scale = config.width / 640.0
-        self.intrinsics = Intrinsics(
-            config.width, config.width * 3 // 4, 525.0 * scale, 525.0 * scale, 320.0 * scale - 0.5, 240.0 * scale - 0.5
-        )
-        self.stamps = np.arange(config.frames) / RATE
-        self.names = tuple(f"frame-{index:06d}" for index in range(config.frames))
-        self.poses = hand_held(self.stamps, config.seed, config.orbit)
-        self.gravity = None
         world = build_world(config.seed, config.objects)
-        self.objects: tuple[TrueObject, ...] = world.objects
-        self.clutter: tuple[TrueObject, ...] = world.clutter
-        self.classes: tuple[str, ...] = CLASSES
-        self._renderer = Renderer(world.surfaces)
-        self._silhouettes = Silhouettes(world.objects, world.surfaces)
-        exposure = Sway(np.random.default_rng([config.seed, 2]), 1, config.camera.drift_band)(self.stamps)[0]
-        self._exposure = np.exp(config.camera.drift * exposure)
-        self._casts: dict[int, Cast] = {}
-
-    def __len__(self) -> int:
-        return len(self.stamps)
-
-    def __iter__(self) -> Iterator[Frame]:
-        return (self[index] for index in range(len(self)))
-
-    def __getitem__(self, index: int) -> Frame:
-        index = self._checked(index)
-        rendering = self._renderer.render(self.intrinsics, self.poses[index], self._cast(index))
-        sensor, camera, seed = self.config.sensor, self.config.camera, self.config.seed
-        return Frame(
-            index=index,
-            name=self.names[index],
-            stamp=float(self.stamps[index]),
-            color=develop(
-                rendering.radiance, float(self._exposure[index]), camera, np.random.default_rng([seed, 3, index])
-            ),
-            depth=measure(
-                rendering.depth, rendering.incidence, self.intrinsics, sensor, np.random.default_rng([seed, 4, index])
-            ),
-            intrinsics=self.intrinsics,
-            T_world_camera=self.poses[index].copy(),
+        stamps = np.arange(config.frames) / RATE
+        super().__init__(
+            name="sample:tabletop" + _changed(config),
+            scene=Scene(world.objects, world.clutter, CLASSES, world.surfaces, Lights()),
+            width=config.width,
+            stamps=stamps,
+            poses=hand_held(stamps, config.seed, config.orbit),
+            frames=config.frames,
+            seed=config.seed,
+            sensor=config.sensor,
+            camera=config.camera,
         )
 
     def __reduce__(self):
-        """Pickle the recipe: ray casters cannot be sent to another process."""
+        """Pickle the recipe."""
         return TabletopSequence, (self.config,)
-
-    def truth(self, index: int) -> FrameTruth:
-        """What can be seen of every object; exact for the rendered geometry."""
-        index = self._checked(index)
-        return self._silhouettes.measure(self.intrinsics, self.poses[index], self._cast(index))
-
-    def instances(self, index: int) -> np.ndarray:
-        """(H, W) int32: `id` of the object or clutter that every pixel shows, -1 for the room."""
-        seen = self._silhouettes.instances(self._cast(self._checked(index)))
-        return seen.reshape(self.intrinsics.height, self.intrinsics.width)
-
-    def true_depth(self, index: int) -> np.ndarray:
-        """(H, W) float32 metres along z without the sensor's effects."""
-        index = self._checked(index)
-        return self._renderer.render(self.intrinsics, self.poses[index], self._cast(index)).depth
-
-    def _checked(self, index: int) -> int:
-        if not -len(self) <= index < len(self):
-            raise IndexError(f"{self.name} has {len(self)} frames, asked for {index}")
-        return index % len(self)
-
-    def _cast(self, index: int) -> Cast:
-        cast = self._casts.get(index)
-        if cast is None:
-            cast = self._casts[index] = self._renderer.cast(self.intrinsics, self.poses[index])
-            for old in list(self._casts)[:-KEPT_CASTS]:
-                self._casts.pop(old, None)
-        return cast
 
 
 def _changed(config: TabletopConfig) -> str:

@@ -10,11 +10,11 @@ import numpy as np
 
 from ..errors import UserError
 from ..truth import TrueObject
-from .clutter import CLUTTER
 from .mesh import rotation_z
-from .objects import BUILDERS, Model, Part
-from .room import TABLE_HEIGHT, room
-from .surfaces import Surfaces, assemble
+from .rendering.surfaces import Surfaces, assemble
+from .rooms.room import TABLE_HEIGHT, room
+from .things.clutter import CLUTTER
+from .things.objects import BUILDERS, Model, Part
 
 CLASSES = tuple(BUILDERS)
 CAST = ("cup", "cereal box", "bowl", "soda can", "bottle", "cap", "cup", "soda can", "bowl", "cereal box", "cup", "cap")

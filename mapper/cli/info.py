@@ -65,7 +65,19 @@ def _sequence_lines(sequence: Sequence) -> Iterator[Line]:
     yield "poses", "none" if sequence.poses is None else _poses(np.asarray(sequence.poses))
     down = sequence.gravity
     yield "gravity", "unknown" if down is None else "down is " + ", ".join(f"{x:.3f}" for x in down)
+    yield from _truth_lines(sequence)
     yield from _depth_lines(sequence)
+
+
+def _truth_lines(sequence: Sequence) -> Iterator[Line]:
+    """What is known exactly about the scene, where anything is."""
+    from ...datasets.truth import HasClutter, HasTruth
+
+    if isinstance(sequence, HasTruth):
+        labels = [thing.label for thing in sequence.objects]
+        yield "truth", f"{len(labels)} objects" + _counts(labels)
+        if isinstance(sequence, HasClutter):
+            yield "clutter", f"{len(sequence.clutter)} things of no class"
 
 
 def _loader(path: str, dataset: str | None) -> str:

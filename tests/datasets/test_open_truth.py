@@ -8,8 +8,8 @@ import pytest
 
 from thingmap.datasets.errors import InputError, UserError
 from thingmap.datasets.open_truth import open_truth
+from thingmap.datasets.synthetic.files.writing import write_sequence
 from thingmap.datasets.synthetic.sample import TabletopConfig, TabletopSequence
-from thingmap.datasets.synthetic.writing import write_sequence
 
 MUG = {"name": "white mug", "class": "cup", "position": [1, 2.5, 3], "tolerance": 0.08}
 BOWL = {"class": "bowl", "position": [1, 2, 3]}

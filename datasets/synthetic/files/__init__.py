@@ -1,0 +1,1 @@
+"""Synthetic sequences on disk."""

@@ -1,0 +1,1 @@
+"""Textures: procedural surfaces, printed labels, finishes of a room."""

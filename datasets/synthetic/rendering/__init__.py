@@ -1,0 +1,1 @@
+"""Rays, light, the two cameras, and what exactly was seen."""

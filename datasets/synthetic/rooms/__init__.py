@@ -1,0 +1,1 @@
+"""Rooms with their furniture, and where things can stand in them."""

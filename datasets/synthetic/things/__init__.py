@@ -1,0 +1,1 @@
+"""Models of things: the seven classes, things of no class, imported scans."""
