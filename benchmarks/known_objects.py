@@ -1,28 +1,22 @@
 """Checks of a map against objects that are known to be in the place, and against known false detections.
 
-The file, in the world of the pose files, metres:
-
-    {"objects": [{"name": "white mug", "class": "cup", "position": [x, y, z], "tolerance": 0.08}, ...],
-     "known_false_detections": [{"class": "bowl", "position": [x, y, z], "truth": "the white mug"}, ...]}
-
-Not every object of the place need be listed, so what is further away than the tolerances is not judged.
+The file is in the world of the pose files; `thingmap.datasets.truth_json` describes its form. Not every object of the
+place need be listed, so what is further away than the tolerances is not judged.
 """
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from thingmap.datasets.errors import InputError
+from thingmap.datasets import truth_json
 from thingmap.mapper.evaluation.inputs.case import Alignment
 from thingmap.mapper.map.thing import Thing
 
 MIN_EXISTENCE = 0.9  # of a thing that stands for a listed object
 BELIEVED = 0.5  # existence times probability of the class from which a map claims that there is such an object
-FALSE_RADIUS = 0.25  # m about a known false detection, at least
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,20 +63,13 @@ def read_known_objects(path: Path) -> list[KnownObject]:
     Raises:
         InputError: for a missing file or one that is not of the form.
     """
-    remedy = "see benchmarks/known_objects.py for the form"
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        known = [_known(item, str(item["name"]), float(item["tolerance"]), False) for item in content["objects"]]
-        for item in content.get("known_false_detections", []):
-            radius = max(float(item.get("tolerance", 0.0)), FALSE_RADIUS)
-            known.append(_known(item, f"no {item['class']}: {item.get('truth', 'nothing')}", radius, True))
-    except FileNotFoundError:
-        raise InputError(path, "a file of known objects", "no such file", "check the path") from None
-    except KeyError as error:
-        raise InputError(path, f"the key {error}", "none", remedy) from None
-    except (OSError, ValueError, TypeError, AttributeError) as error:
-        raise InputError(path, "known objects as JSON", str(error), remedy) from None
-    return known
+    content = truth_json.read_known_objects(path)
+    both = (content.objects, False), (content.false_detections, True)
+    return [
+        KnownObject(item.name, item.thing.label, item.thing.position, item.tolerance, is_false)
+        for items, is_false in both
+        for item in items
+    ]
 
 
 def check_things(things: tuple[Thing, ...], known: list[KnownObject], alignment: Alignment) -> list[Check]:
@@ -121,10 +108,3 @@ def _best(belief: np.ndarray, apart: np.ndarray, tolerance: float) -> int | None
         return int(near[np.argmax(belief[near])])
     far = np.flatnonzero((apart <= 1.0) & (belief >= 0.1))
     return int(far[np.argmin(apart[far])]) if len(far) else None
-
-
-def _known(item: dict, name: str, tolerance: float, is_false: bool) -> KnownObject:
-    position = np.array(item["position"], dtype=float)
-    if position.shape != (3,) or not np.isfinite(position).all() or not tolerance > 0.0:
-        raise ValueError(f"{name}: position {item['position']} with tolerance {tolerance}")
-    return KnownObject(name, str(item["class"]), position, tolerance, is_false)

@@ -82,10 +82,10 @@ def _truth_lines(sequence: Sequence) -> Iterator[Line]:
 
 def _loader(path: str, dataset: str | None) -> str:
     """Name of the loader that takes this path, and the layout that it knows."""
-    from ...datasets.open import LOADERS, SAMPLE_PREFIX
+    from ...datasets.open import LOADERS, SAMPLE_PREFIX, SYNTH_PREFIX
 
-    if path.startswith(SAMPLE_PREFIX):
-        return "bundled sample"
+    if path.startswith((SAMPLE_PREFIX, SYNTH_PREFIX)):
+        return "rendered when asked for"
     place = Path(path).expanduser()
     fitting = [loader for loader in LOADERS if dataset in (None, loader.dataset) and loader.find(place)]
     return "; ".join(f"{loader.dataset} ({loader.layout})" for loader in fitting) or str(dataset)

@@ -118,7 +118,7 @@ def test_reading_a_file(tmp_path: Path) -> None:
         ('{"objects": [{"name": "a", "class": "b", "position": [1, 2], "tolerance": 1}]}', "position"),
         ('{"objects": [{"name": "a", "class": "b", "position": [1, 2, 3]}]}', "tolerance"),
         ('{"objects": [{"name": "a", "class": "b", "position": [1, 2, 3], "tolerance": 0}]}', "tolerance"),
-        ("[]", "JSON"),
+        ("[]", "an object"),
     ],
 )
 def test_a_wrong_file_is_an_input_error(tmp_path: Path, text: str, complaint: str) -> None:
