@@ -51,8 +51,11 @@ def judge(scene: Scene, variant: Variant, folder: Path) -> None:
     detector = DETECTOR if variant.name == "full" else "none"  # single views are the same for all
     truth = open_truth(place)
     judged = to_report(evaluate_run(out.path, truth, EvaluationConfig(), detector))
-    pictures = take_pictures((case for result in judged.results for case in result.worst), truth.sequence)
-    write_report(judged, render_page(judged, pictures), report_folder(scene, variant, folder))
+    page = None
+    if variant.name == "full":
+        pictures = take_pictures((case for result in judged.results for case in result.worst), truth.sequence)
+        page = render_page(judged, pictures)
+    write_report(judged, page, report_folder(scene, variant, folder))
 
 
 def report_folder(scene: Scene, variant: Variant, folder: Path) -> Path:

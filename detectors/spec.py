@@ -2,17 +2,18 @@
 
     onnx:PATH       names=FILE confidence=0.1 nms=0.5 max=100 backend=opencv size=640x480 family=yolox-decoded
     recorded:PATH   format=coco names=FILE label=cabinet images=FILE
-    simulated       seed=1
+    simulated       seed=1 max_recall=0.96 background_spots=5 chance_rate=0.12 ...
     none
 
 Options follow a question mark: `onnx:model.onnx?confidence=0.2&backend=opencv`. `OnnxDetector` and
-`RecordedDetections` explain them.
+`RecordedDetections` explain them; those of `simulated` are the seed and the numbers of `SimulatedDetectorConfig`.
 A path alone is `onnx:` when it ends in .onnx, and `recorded:` when it is a .json file or a folder.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,6 +21,7 @@ from ..datasets.errors import UserError
 from ..datasets.sequence import Sequence
 from ..datasets.truth import HasTruth
 from .detector import Detector, find_nothing
+from .simulated_config import SimulatedDetectorConfig
 
 
 def make_detector(spec: str, sequence: Sequence | None = None) -> Detector:
@@ -101,7 +103,8 @@ def _make_simulated(path: str, sequence: Sequence | None, options: dict[str, Any
         raise UserError("detector simulated needs a synthetic sequence, whose objects are known")
     from .simulated import SimulatedDetector
 
-    return SimulatedDetector(sequence, **options)
+    seed = options.pop("seed", 0)
+    return SimulatedDetector(sequence, SimulatedDetectorConfig(**options), seed)
 
 
 def _make_none(path: str, sequence: Sequence | None, options: dict[str, Any]) -> Detector:
@@ -114,6 +117,7 @@ def _size(text: str) -> tuple[int, int]:
     return int(width), int(height or width)
 
 
+_NUMBERS = [field for field in fields(SimulatedDetectorConfig) if isinstance(field.default, int | float)]
 _MEANING = {int: "a whole number", float: "a number", _size: "a size such as 640x480"}
 
 
@@ -152,6 +156,11 @@ _KINDS = {
             "images": ("images", str),
         },
     ),
-    "simulated": _Kind("simulated", False, _make_simulated, {"seed": ("seed", int)}),
+    "simulated": _Kind(
+        "simulated",
+        False,
+        _make_simulated,
+        {"seed": ("seed", int), **{field.name: (field.name, type(field.default)) for field in _NUMBERS}},
+    ),
     "none": _Kind("none", False, _make_none, {}),
 }

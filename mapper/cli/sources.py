@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     from ...datasets.sequence import Sequence
     from ..run_report import RunReport
 
-SequenceArgument = Annotated[str, typer.Argument(metavar="SEQUENCE", help="Folder of a sequence, sample:tabletop, or synth:PRESET.")]
+SequenceArgument = Annotated[
+    str, typer.Argument(metavar="SEQUENCE", help="Folder of a sequence, sample:tabletop, or synth:PRESET.")
+]
 DatasetOption = Annotated[str | None, typer.Option(metavar="NAME", help="Loader; told from the folder by default.")]
 StrideOption = Annotated[int, typer.Option(min=1, metavar="N", help="Take every Nth frame.")]
 MaxFramesOption = Annotated[int | None, typer.Option(min=1, metavar="N", help="Stop after N frames.")]

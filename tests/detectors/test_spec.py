@@ -16,6 +16,7 @@ from thingmap.detectors.detections import Detections
 from thingmap.detectors.onnx import OnnxDetector
 from thingmap.detectors.onnx.outputs import OutputFamily
 from thingmap.detectors.recorded import RecordedDetections, RecordedFormat, write_detections
+from thingmap.detectors.simulated_config import SimulatedDetectorConfig
 from thingmap.detectors.spec import make_detector
 
 
@@ -75,14 +76,18 @@ def test_recorded_by_position_needs_every_frame(tmp_path: Path):
 
 
 def test_simulated_gets_the_sequence_and_the_options(monkeypatch):
-    made = SimpleNamespace(SimulatedDetector=lambda sequence, **options: (sequence, options))
+    made = SimpleNamespace(SimulatedDetector=lambda *arguments: arguments)
     monkeypatch.setitem(sys.modules, "thingmap.detectors.simulated", made)
     frames: Any = Frames()
     with pytest.raises(UserError, match="needs a synthetic sequence"):
         make_detector("simulated", frames)
     frames.objects, frames.classes, frames.truth = (), (), lambda index: None
-    assert make_detector("simulated?seed=3", frames) == (frames, {"seed": 3})
-    assert make_detector("simulated", frames) == (frames, {})
+    assert make_detector("simulated?seed=3", frames) == (frames, SimulatedDetectorConfig(), 3)
+    assert make_detector("simulated", frames) == (frames, SimulatedDetectorConfig(), 0)
+    worse = make_detector("simulated?max_recall=0.5&background_spots=9", frames)
+    assert worse == (frames, SimulatedDetectorConfig(max_recall=0.5, background_spots=9), 0)
+    with pytest.raises(UserError, match="there is no option 'spot_score'"):
+        make_detector("simulated?spot_score=1", frames)  # two numbers
 
 
 def test_a_folder(tmp_path: Path):
