@@ -17,8 +17,8 @@ class EvaluationConfig:
         min_visibility: visible share below which an object is nobody's fault: neither to be found nor a false positive.
         believed: existence times probability of the class at which a thing counts as claimed.
         distance_share: of an object's diagonal: centres nearer than this may be the same (0.5: the thing's centre lies
-            in the ball about the object). Objects with a `tolerance` have that instead.
-        max_distance: metres, the same for objects of unknown size.
+            in the ball about the object), or nearer than its `tolerance` where that is more.
+        max_distance: metres, the same for objects of unknown size without a tolerance.
         volume_iou: of upright boxes, at which a thing may be an object in the matching by volume (Song et al.,
             SUN RGB-D: 0.25).
         point_distance: metres from a labelled true point at which a point of the map takes its label.

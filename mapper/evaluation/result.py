@@ -49,11 +49,15 @@ class Metric:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows of text, numbers or None (shown as a dash); the first column names the row."""
+    """Rows of text, numbers or None (shown as a dash); the first column names the row.
+
+    Pages show a `folded` one on demand only: it is there for programs.
+    """
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[str | float | int | None, ...], ...]
+    folded: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -76,17 +76,22 @@ def box_areas(xyxy: np.ndarray) -> np.ndarray:
     return np.maximum(xyxy[:, 2] - xyxy[:, 0], 0.0) * np.maximum(xyxy[:, 3] - xyxy[:, 1], 0.0)
 
 
+def inside_share(xyxy: np.ndarray, intrinsics: Intrinsics) -> np.ndarray:
+    """(N,) share of each box's area that lies in the image; NaN for a box without area, and for a NaN one."""
+    with np.errstate(invalid="ignore"):
+        return box_areas(clip_boxes(xyxy, intrinsics)) / box_areas(xyxy)
+
+
 def found_boxes(xyxy: np.ndarray, class_id: np.ndarray, score: np.ndarray, intrinsics: Intrinsics) -> FoundBoxes:
     """Clip (N, 4) boxes with their (N,) classes and scores; those without area in the image, and NaN ones, go."""
     whole = np.asarray(xyxy, dtype=np.float64).reshape(-1, 4)
     clipped = clip_boxes(whole, intrinsics)
-    area = box_areas(clipped)
-    kept = np.flatnonzero(area > 0.0)
+    kept = np.flatnonzero(box_areas(clipped) > 0.0)
     return FoundBoxes(
         xyxy=clipped[kept],
         class_id=np.asarray(class_id, dtype=np.int64)[kept],
         score=np.asarray(score, dtype=np.float64)[kept],
-        inside=area[kept] / box_areas(whole[kept]),
+        inside=inside_share(whole[kept], intrinsics),
         source=kept,
     )
 

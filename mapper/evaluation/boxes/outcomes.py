@@ -23,7 +23,7 @@ def write_outcomes(outcomes: Outcomes) -> Table:
     for (views, label), one in outcomes.items():
         row = (str(views), label, one.images, one.objects, _text(one.scores[one.right]), _text(one.scores[~one.right]))
         rows.append(row)
-    return Table(OUTCOMES, COLUMNS, tuple(rows))
+    return Table(OUTCOMES, COLUMNS, tuple(rows), folded=True)
 
 
 def read_outcomes(result: ProtocolResult | Mapping[str, Any]) -> Outcomes:

@@ -8,7 +8,7 @@ from ....datasets.ground_truth import GroundTruth
 from ....detectors.detections import Detections
 from ..config import EvaluationConfig
 from .case import Case, MappedRun
-from .frames import align, common_frames
+from .frames import align, common_frames, other_source
 from .placing import check_classes, place_things
 
 
@@ -50,6 +50,11 @@ def build_case(
 
 def _notes(run: MappedRun, truth: GroundTruth, common: int, left_out: dict[str, int]) -> list[str]:
     notes = []
+    if other_source(run, truth):
+        notes.append(
+            f"The map was made of {run.object_map.source}, the truth is that of {truth.name}: unless these are two "
+            "names of one sequence, no number here means anything."
+        )
     if left_out:
         counts = ", ".join(f"{count} {label}" for label, count in sorted(left_out.items()))
         many = sum(left_out.values())

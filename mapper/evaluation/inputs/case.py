@@ -57,7 +57,7 @@ class MappedRun:
         keyframes: keyframe poses with covariances; None where the run wrote none.
         cloud: the cloud, (M, 3) metres in the map's frame, and (M,) int64 labels of its points where the run labelled
             them, else None: indices into `object_map.classes`, `NO_OBJECT` for what is none of them. Raises
-            `InputError` where there is no cloud.
+            `NotEvaluated` where there is no cloud and `InputError` where it is damaged.
     """
 
     folder: Path

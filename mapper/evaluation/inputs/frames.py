@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ....datasets.errors import UserError
+from ....datasets.folder_truth import FolderWithTruth
 from ....datasets.ground_truth import GroundTruth
 from ....datasets.stamps import associate
 from ...map.object_map import MapFrame
@@ -13,7 +14,7 @@ from .alignment import align_poses, anchor
 from .case import Alignment, MappedRun
 
 MAX_DISTANCE = 0.5  # m, and
-MAX_ANGLE = 20.0  # degrees: no camera is so far from its true pose in the same world
+MAX_ANGLE = 20.0  # degrees: the typical camera of a map is nearer to its true pose in the same world
 
 
 def common_frames(run: MappedRun, truth: GroundTruth, config: EvaluationConfig) -> tuple[np.ndarray, np.ndarray]:
@@ -43,7 +44,9 @@ def align(
 ) -> tuple[Alignment, Alignment]:
     """How the map lies to the truth, and the same with the first common pose made equal.
 
-    A map in the dataset's own axes is left where it is, but must be near; every other one is aligned by poses.
+    A map in the dataset's own axes is left where it is, but must be near; every other one is aligned by poses, and must
+    be near then if it was made of a sequence of another name. (Under the same name it may have lost its way, which is
+    to be measured.)
 
     Args:
         run, truth: what to align.
@@ -56,12 +59,21 @@ def align(
     """
     estimate, true = common_poses(run, truth, truth_index, run_index)
     if run.object_map.frame is MapFrame.DATASET:
-        if len(true):
-            _check_world(run, truth, estimate, true)
+        if len(true) and (miss := _miss(estimate, true)) is not None:
+            raise UserError(
+                f"{run.folder}: the map is in the dataset's axes, but {truth.name} is in another world: its cameras "
+                f"are {miss}; give the truth of the poses that were mapped with"
+            )
         same = Alignment(np.eye(3), np.zeros(3), "none: the map is in the dataset's axes")
         return same, same
     if len(true):
-        return align_poses(estimate, true), anchor(estimate, true)
+        alignment = align_poses(estimate, true)
+        if other_source(run, truth) and (miss := _miss(alignment.pose(estimate), true)) is not None:
+            raise UserError(
+                f"{run.folder}: the map was made of {run.object_map.source}, not of {truth.name}, and after alignment "
+                f"the true cameras are {miss}; give the truth of {run.object_map.source}"
+            )
+        return alignment, anchor(estimate, true)
     if not _has_places(truth):
         same = Alignment(np.eye(3), np.zeros(3), "none: the truth knows images only")
         return same, same
@@ -83,18 +95,28 @@ def common_poses(
     return run.poses[run_index][known], true[known]
 
 
-def _check_world(run: MappedRun, truth: GroundTruth, estimate: np.ndarray, true: np.ndarray) -> None:
-    """The typical camera is near its true pose; raises `UserError` with the differences."""
+def other_source(run: MappedRun, truth: GroundTruth) -> bool:
+    """Whether the map was made of a sequence of another name; False where the truth is not one of a sequence.
+
+    A rendered sequence has two names: that of its folder, and the line that it was rendered from.
+    """
+    names = {"", truth.name}
+    if isinstance(truth.sequence, FolderWithTruth):
+        names.add(truth.sequence.source)
+    return truth.sequence is not None and run.object_map.source not in names
+
+
+def _miss(estimate: np.ndarray, true: np.ndarray) -> str | None:
+    """How far the typical camera is from its true pose, in words; None where it is near."""
     distance = float(np.median(np.linalg.norm(estimate[:, :3, 3] - true[:, :3, 3], axis=1)))
     cosine = (np.einsum("nij,nij->n", estimate[:, :3, :3], true[:, :3, :3]) - 1.0) / 2.0
     angle = float(np.degrees(np.median(np.arccos(np.clip(cosine, -1.0, 1.0)))))
-    if distance > MAX_DISTANCE or angle > MAX_ANGLE:
-        raise UserError(
-            f"{run.folder}: the map is in the dataset's axes, but {truth.name} is in another world: its cameras "
-            f"are {distance:.2f} m and {angle:.0f} degrees from the mapped ones (medians over {len(true)} frames), "
-            f"expected at most {MAX_DISTANCE:g} m and {MAX_ANGLE:g} degrees; give the truth of "
-            "the poses that were mapped with"
-        )
+    if distance <= MAX_DISTANCE and angle <= MAX_ANGLE:
+        return None
+    return (
+        f"{distance:.2f} m and {angle:.0f} degrees from the mapped ones (medians over {len(true)} frames), expected at "
+        f"most {MAX_DISTANCE:g} m and {MAX_ANGLE:g} degrees"
+    )
 
 
 def _has_places(truth: GroundTruth) -> bool:

@@ -28,11 +28,13 @@ from ....datasets.truth import NO_OBJECT
 from ...map.object_map import ObjectMap
 from ...map.record import Record
 from ...map.store import AGAIN, OutputFolder
+from ..result import NotEvaluated
 from .case import KeyframePoses, MappedRun, Snapshot
 
 LABELS_FILE = "labels.ply"
 SNAPSHOT_INDEX = "index.json"
 SNAPSHOT_SCHEMA = "thingmap-snapshots/1"
+STAMP_ROUNDING = 1e-5  # s; files of trajectories hold microseconds
 SYMMETRY = 1e-6  # of a covariance, relative to its largest value
 
 
@@ -56,14 +58,14 @@ def load_run(out: str | Path) -> MappedRun:
         stamps=trajectory.stamps,
         poses=trajectory.matrices,
         report=report,
-        snapshots=_read_snapshots(folder.snapshot_folder),
+        snapshots=_read_snapshots(folder.snapshot_folder, trajectory.stamps),
         keyframes=_read_keyframes(folder.keyframes_file) if folder.keyframes_file.is_file() else None,
         cloud=cache(lambda: _read_cloud(folder, object_map)),
     )
 
 
-def _read_snapshots(folder: Path) -> tuple[Snapshot, ...]:
-    """By growing number of frames; none where there is no index."""
+def _read_snapshots(folder: Path, stamps: np.ndarray) -> tuple[Snapshot, ...]:
+    """By growing number of frames; none where there is no index. The run has mapped frames at these (N,) `stamps`."""
     index = folder / SNAPSHOT_INDEX
     if not index.is_file():
         return ()
@@ -78,6 +80,10 @@ def _read_snapshots(folder: Path) -> tuple[Snapshot, ...]:
     for one, other in pairwise(snapshots):
         if one.frames == other.frames:
             raise InputError(index, "one snapshot for a number of frames", f"two after {one.frames} frames", AGAIN)
+    for one in snapshots:
+        if not (0 < one.frames <= len(stamps) and abs(stamps[one.frames - 1] - one.stamp) <= STAMP_ROUNDING):
+            found = f"one after {one.frames} frames at {one.stamp:.6f} s"
+            raise InputError(index, f"snapshots of the {len(stamps)} frames of trajectory.txt", found, AGAIN)
     return tuple(snapshots)
 
 
@@ -129,6 +135,8 @@ def _read_cloud(folder: OutputFolder, object_map: ObjectMap) -> tuple[np.ndarray
     labelled = folder.path / LABELS_FILE
     if labelled.is_file():
         return _read_labels(labelled, object_map)
+    if not folder.cloud_file.is_file():
+        raise NotEvaluated(f"the run has no cloud: there is neither {folder.cloud_file.name} nor {LABELS_FILE}")
     return folder.read_cloud()[0], None
 
 

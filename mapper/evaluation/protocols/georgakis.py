@@ -1,11 +1,13 @@
 """Protocol 1: boxes of single and of many views, as Georgakis et al. (RGB-D Multi-View Object Detection with Object
 Proposals and Shape Context, section IV) score them.
 
-Every `frame_step`-th frame is judged, and a box is right at an IoU of `box_iou` (rules in `box_matching`).
+Every `frame_step`-th frame is judged, and a box is right at an IoU of `box_iou` (rules in `boxes.matching`; the paper
+asks for more than 0.5, here 0.5 itself is enough).
 
-Single view: the detector's boxes in those frames. Average precision by class as in table I; precision and recall as in
-table II at one "empirical threshold" for all classes, which here is the one with the best F1 on these very frames: the
-single view gets the benefit of hindsight, the map does not.
+Single view: the detector's boxes in those frames. Average precision by class as in table I, though a box is ranked in
+its best class only, and there each class has a detector of its own. Precision and recall as in table II at one
+"empirical threshold" for all classes, which here is the one with the best F1 on these very frames: the single view gets
+the benefit of hindsight, the map does not.
 
 Multi-view: the things of the final map, projected into the same frames with the poses that the run itself estimated
 for them, so that no alignment with the truth enters. Precision and recall are those of things with a belief of at least
@@ -13,6 +15,10 @@ for them, so that no alignment with the truth enters. Precision and recall are t
 claims to be there in every frame into which it projects, be it hidden or not: on a hardly visible object of its class
 it is ignored, on nothing it is a false positive, also where something else would hide it, provided half of its box is
 in the image.
+
+The headline precision and recall are of the boxes of all classes together. The averages of table II weigh classes
+alike and count proposals that are called background as a class; a map proposes no background, so the last rows of the
+table of boxes average the object classes alone.
 
 Points: precision and recall by class, background among them, as in the last rows of table II.
 """
@@ -115,6 +121,7 @@ def _box_notes(case: Case, views: dict[str, list[Matches]]) -> list[str]:
         "The single view's threshold is the one with the best F1 on these frames: hindsight in its favour."
         if SINGLE in views
         else "Not evaluated: single view: there is no detector.",
+        "Precision, recall and F1 above are of all boxes together; the paper averages over classes, as the table does.",
         "Things of the map are drawn as upright elliptic cylinders, from the poses that the run estimated.",
         "A thing that is on no object is false in every frame that it projects into, hidden there or not.",
     ]

@@ -40,7 +40,7 @@ def evaluate(case: Case) -> ProtocolResult:
         protocol="lai",
         title="Labelled points",
         follows="Lai et al., Detection-based Object Labeling in 3D Scenes, section IV-B, figures 4 and 5",
-        metrics=_metrics(own, random, background),
+        metrics=(*_metrics(own, random, background), Metric("object points covered", points.covered)),
         tables=(
             Table("F-scores", ("labelling", "micro F", "macro F", "macro F with background"), _f_rows(labellings)),
             Table(
@@ -53,6 +53,7 @@ def evaluate(case: Case) -> ProtocolResult:
             *points.notes(case.config.point_distance),
             "Categories without true points are in no average; one that was never named has precision 0 there.",
             "Macro F averages the object categories, as the paper's text says; its figures include the background.",
+            "Object points covered: share of the true points of objects that have a point of the map nearby.",
             f"Random draws uniformly among {len(classes)} categories and background.",
         ),
     )

@@ -7,8 +7,11 @@ Explicit Occlusion Reasoning for 3D Object Detection, section 5.3: the same for 
 A view is a mapped frame. The next one had no pose yet when the map was made: it is the last mapped frame's pose, as
 estimated then, times the true motion to the next frame; where the truth has no poses, the motion that the run estimated
 in the end. All things of that map are ranked, the doubtful ones too, by belief in the class that the map calls them.
-What counts as found is said in `box_matching`, how things are drawn in `projection`; a thing that is on no object is
-false whether the map holds it for hidden or not, provided half of its box is in the image.
+What counts as found is said in `boxes.matching`, how things are drawn in `boxes.projection`; a thing that is on no
+object is false whether the map holds it for hidden or not, provided half of its box is in the image.
+
+The papers draw a curve a class. So do the plots and tables here; the headline ranks the boxes of all classes together,
+so that its one false positive per image is one of any class.
 
 One sequence gives one image for each number of views, so the curves of one scene are coarse. `pool` makes one result of
 several scenes, as the papers do of thirty: the table `OUTCOMES` holds all that it needs, in reports too.
@@ -156,6 +159,7 @@ def _result(outcomes: Outcomes, config: EvaluationConfig, notes: Iterable[str]) 
         notes=(
             *notes,
             "Doubtful things are ranked too; each counts in the class that the map calls it.",
+            "The headline ranks all classes together: one false positive per image is one of any class.",
             f"Scenes are pooled from the table {OUTCOMES!r}: one image a scene and number of views.",
         ),
     )
@@ -169,14 +173,17 @@ def _table(
 
 
 def _recall_plot(outcomes: Outcomes, label: str, lengths: tuple[int, ...]) -> Plot:
+    """Best recall with at most so many false positives per image; it holds until the border, as nothing more comes."""
+    known = [(length, outcomes[length, label]) for length in lengths if (length, label) in outcomes]
+    curves = {length: recall_per_false_positives(ranked) for length, ranked in known if ranked.objects}
+    most = max([FALSE_PER_IMAGE, *(float(fppi[-1]) for fppi, _ in curves.values() if len(fppi))])
     series = []
-    for length in lengths:
-        ranked = outcomes.get((length, label))
-        if ranked is not None and ranked.objects:
-            fppi, recall = recall_per_false_positives(ranked)
-            curve = (0.0, *fppi.tolist()), (0.0, *recall.tolist())
-            series.append(Series(f"{length} views", *curve, PlotKind.STEP))
-    return Plot(f"Recall and false positives: {label}", "false positives per image", "recall", tuple(series))
+    for length, (fppi, recall) in curves.items():
+        last = recall[-1:].tolist() or [0.0]
+        x, y = (0.0, *fppi.tolist(), most), (0.0, *recall.tolist(), *last)
+        series.append(Series(f"{length} views", x, y, PlotKind.STEP))
+    name, limits = f"Recall and false positives: {label}", (0.0, most, 0.0, 1.0)
+    return Plot(name, "false positives per image", "recall", tuple(series), limits)
 
 
 def _precision_plot(

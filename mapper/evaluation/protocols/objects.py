@@ -1,11 +1,11 @@
 """Protocol 4: the objects of a map, one to one with those of the scene.
 
 A thing is a claim where existence times probability of its class is at least one half. Claims are matched with objects
-whatever they are called (`object_matching`), by distance of centres (the main matching) and by volume; then names are
-compared inside the matching (`object_scores`), and centres, sizes and volumes of the matched (`object_errors`). The
+whatever they are called (`things.matching`), by distance of centres (the main matching) and by volume; then names are
+compared inside the matching (`things.scores`), and centres, sizes and volumes of the matched (`things.errors`). The
 four papers count boxes in images, not objects in space; what is measured here is defined here.
 
-Objects that no mapped frame showed well (`seen_objects`) are matched too, and then neither they nor their things count.
+Objects that no mapped frame showed well (`things.seen`) are matched too, and then neither they nor their things count.
 A thing on an object of no class stands for nothing: it is a false positive.
 """
 
@@ -107,9 +107,9 @@ def believed_false_detections(case: Case) -> list[tuple[PlacedThing, TrueObject]
 def _score_by_volume(
     case: Case, claims: Sequence[PlacedThing], counted: np.ndarray, iou: float, exhaustive: bool
 ) -> Scores | None:
-    """None where the size of an object that counts is unknown."""
-    sized = np.array([np.isfinite(true.size).all() for true in case.truth.located])
-    return score(match_by_volume(case, claims, counted, iou), exhaustive) if sized[counted].all() else None
+    """None where the size of an object is unknown: what stands for it would be false, even if it need not be found."""
+    sized = all(np.isfinite(true.size).all() for true in case.truth.located)
+    return score(match_by_volume(case, claims, counted, iou), exhaustive) if sized else None
 
 
 def _count_metrics(case: Case, matching: Matching, scores: Scores, false: int) -> tuple[Metric, ...]:
@@ -158,7 +158,7 @@ def _notes(case: Case, matching: Matching, seen: SeenObjects, exhaustive: bool) 
     config, truth = case.config, case.truth
     notes = [
         f"Claims: existence times probability at least {config.believed:g}. Centres within {config.distance_share:g} "
-        f"of the object's diagonal, its tolerance, or {config.max_distance:g} m where its size is unknown.",
+        f"of the object's diagonal or its tolerance; of unknown size, its tolerance or {config.max_distance:g} m.",
         f"Aligned: {case.alignment.method}.",
     ]
     if ignored := len(matching.objects) - len(matching.wanted):

@@ -62,8 +62,8 @@ def neighbours(count: int) -> np.ndarray:
 def pairs_apart(stamps: np.ndarray, seconds: float = SECOND) -> np.ndarray:
     """(P, 2) rows i, j: for each i the stamp nearest to so many seconds later, where within `PAIR_TOLERANCE`.
 
-    `stamps` (N,) are sorted.
+    `stamps` (N,) are sorted, `seconds` are more than the tolerance.
     """
     partner = nearest(stamps + seconds, stamps, PAIR_TOLERANCE)
-    first = np.flatnonzero((partner >= 0) & (partner != np.arange(len(stamps))))
+    first = np.flatnonzero(partner >= 0)
     return np.stack([first, partner[first]], axis=1)

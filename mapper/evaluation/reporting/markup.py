@@ -43,7 +43,7 @@ def document(title: str, body: Iterable[str]) -> str:
 
 
 def table(content: Table) -> str:
-    """A table that scrolls where it is wide and opens where it is long; columns of numbers are set to the right."""
+    """A table that scrolls where it is wide and opens where it is folded or long; numbers are set to the right."""
     styles = [_style([row[column] for row in content.rows]) for column in range(len(content.columns))]
     columns = zip(content.columns, styles, strict=True)
     head = "".join(f'<th scope="col"{style}>{escape(name)}</th>' for name, style in columns)
@@ -52,7 +52,7 @@ def table(content: Table) -> str:
         first, *rest = (escape(cell_text(cell)) for cell in row)
         cells = "".join(f"<td{style}>{cell}</td>" for cell, style in zip(rest, styles[1:], strict=True))
         lines.append(f'<tr><th scope="row"{styles[0]}>{first}</th>{cells}</tr>')
-    if len(lines) <= MANY:
+    if len(lines) <= MANY and not content.folded:
         return scrolling(content.title, head, lines)
     summary = f"<summary>{escape(content.title)} ({len(lines)} rows)</summary>"
     return f"<details>{summary}\n{scrolling('', head, lines)}</details>"

@@ -40,7 +40,8 @@ def _body(report: Report, name: str, pictures: Mapping[WorstCase, Picture]) -> I
     what = f"{mapped}, judged by {report.truth}, evaluator {report.evaluator}"
     yield f"<header><h1>Evaluation of {escape(name)}</h1>"
     yield f'<p class="quiet">{escape(what)}</p>'
-    yield f"{_notes(report.notes)}</header>"
+    yield from (f'<p class="warning">{escape(note)}</p>' for note in report.notes)
+    yield "</header>"
     yield from _headline(report)
     for number, result in enumerate(report.results, start=1):
         yield from _section(result, f"r{number}", pictures)

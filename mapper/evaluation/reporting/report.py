@@ -86,15 +86,18 @@ def to_report(evaluation: Evaluation) -> Report:
     return build(Report, _plain(values), Path(JSON_FILE))
 
 
-def write_report(report: Report, page: str, folder: Path) -> tuple[Path, Path]:
+def write_report(report: Report, page: str | None, folder: Path) -> tuple[Path, Path]:
     """Write `report.json` and `report.html`, whole or not at all, into a folder, made where absent; gives their paths.
+
+    Without a `page` there is no new `report.html`.
 
     Raises:
         UserError: it cannot be written.
     """
     make_folder(folder)
     json_file, page_file = folder / JSON_FILE, folder / PAGE_FILE
-    write_atomic(page_file, page.encode())
+    if page is not None:
+        write_atomic(page_file, page.encode())
     write_atomic(json_file, f"{format_json(report.to_document())}\n".encode())
     return json_file, page_file
 

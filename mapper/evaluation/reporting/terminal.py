@@ -26,7 +26,9 @@ def terminal() -> Console:
 
 
 def print_report(report: Report, console: Console) -> None:
-    """The metrics of every protocol with their units, then what was not evaluated, a line each."""
+    """The notes on all numbers and the metrics of every protocol with their units, then what was not evaluated."""
+    for note in report.notes:
+        console.print(Text(f"note: {' '.join(note.split())}", style="yellow"))
     table = _table(("metric", "left"), ("value", "right"), ("unit", "left"), ("", "left"))
     for result in report.results:
         table.add_row(Text(result.title, style="bold"))

@@ -92,13 +92,18 @@ def believed(case: Case) -> tuple[PlacedThing, ...]:
 
 
 def reaches(case: Case) -> np.ndarray:
-    """(M,) metres within which a thing may stand for each located object: its tolerance, a share of its diagonal, or a
-    fixed distance where its size is unknown."""
+    """(M,) metres within which a thing may stand for each located object.
+
+    That is a share of its diagonal, or its tolerance where that is more: a tolerance says how well the truth is known,
+    and not how well a map must be. Of unknown size, it is the tolerance, or a fixed distance without one.
+    """
     config, result = case.config, []
     for true in case.truth.located:
-        diagonal = float(np.linalg.norm(true.size))  # NaN where the size is unknown
-        reach = config.distance_share * diagonal if diagonal > 0.0 else config.max_distance
-        result.append(case.truth.tolerance.get(true.id, reach))
+        diagonal, tolerance = float(np.linalg.norm(true.size)), case.truth.tolerance.get(true.id)
+        if diagonal > 0.0:
+            result.append(max(config.distance_share * diagonal, tolerance or 0.0))
+        else:  # NaN where the size is unknown
+            result.append(config.max_distance if tolerance is None else tolerance)
     return np.array(result)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from ....datasets.truth import TrueObject
 from ....factors.volume import project_volumes
+from ..boxes.image_boxes import box_areas, clip_boxes, inside_share
 from ..boxes.projection import project_cylinders
 from ..inputs.case import Case, PlacedThing
 from ..result import WorstCase
@@ -75,11 +76,9 @@ class Projector:
         """Square pixels inside the image, less where the image cuts the box."""
         intrinsics = self._case.truth.intrinsics
         assert intrinsics is not None
-        width = min(box[2], intrinsics.width - 0.5) - max(box[0], -0.5)
-        height = min(box[3], intrinsics.height - 0.5) - max(box[1], -0.5)
-        if width <= 0.0 or height <= 0.0:
-            return 0.0
-        return (width * height) ** 2 / ((box[2] - box[0]) * (box[3] - box[1]))
+        xyxy = np.array([box])
+        shown = float(box_areas(clip_boxes(xyxy, intrinsics))[0])
+        return shown * float(inside_share(xyxy, intrinsics)[0]) if shown > 0.0 else 0.0
 
 
 def worst_cases(

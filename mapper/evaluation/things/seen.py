@@ -14,8 +14,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from ....datasets.frame import Intrinsics
 from ....datasets.truth import FrameTruth
+from ..boxes.image_boxes import box_areas, inside_share
 from ..inputs.case import Case
 
 MIN_INSIDE = 0.5  # share of an object's box inside the image, of frames that tell how occluded it is
@@ -70,7 +70,9 @@ def see_objects(case: Case) -> SeenObjects:
         if frame is None:
             continue
         frames += 1
-        telling = (frame.visibility > 0.0) & (_inside(frame.xyxy, case.truth.intrinsics) >= MIN_INSIDE)
+        telling = frame.visibility > 0.0
+        if case.truth.intrinsics is not None:
+            telling &= inside_share(frame.xyxy, case.truth.intrinsics) >= MIN_INSIDE
         for row, object_id in enumerate(frame.object_id.tolist()):
             view = _view(index, frame, row)
             if view.visibility >= case.config.seen_visibility and view.side >= case.config.seen_side:
@@ -84,18 +86,6 @@ def see_objects(case: Case) -> SeenObjects:
 
 
 def _view(index: int, frame: FrameTruth, row: int) -> View:
-    left, top, right, bottom = frame.xyxy_visible[row]
-    area = (right - left) * (bottom - top)
-    side = float(np.sqrt(area)) if area > 0.0 else 0.0  # NaN where nothing is visible
+    side = float(np.sqrt(np.nan_to_num(box_areas(frame.xyxy_visible[[row]])[0])))  # NaN where nothing is visible
     a, b, c, d = (float(value) for value in frame.xyxy[row])
     return View(index, float(frame.visibility[row]), side, (a, b, c, d))
-
-
-def _inside(xyxy: np.ndarray, intrinsics: Intrinsics | None) -> np.ndarray:
-    """(M,) share of each box's area inside the image; 1 where the image's size is unknown."""
-    if intrinsics is None:
-        return np.ones(len(xyxy))
-    limits = np.array([intrinsics.width, intrinsics.height, intrinsics.width, intrinsics.height]) - 0.5
-    cut = np.clip(xyxy, -0.5, limits)
-    whole = np.prod(xyxy[:, 2:] - xyxy[:, :2], axis=1)
-    return np.prod(cut[:, 2:] - cut[:, :2], axis=1) / np.maximum(whole, 1e-12)

@@ -77,7 +77,7 @@ def occlusion_plot(table: Table) -> Plot:
     """The columns of `occlusion_table` as curves over the middles of the bins."""
     middle, recall, joint = (tuple(float(row[k] or 0.0) for row in table.rows) for k in (1, 3, 4))
     series = (Series("found", middle, recall), Series("found by its name", middle, joint))
-    return Plot(table.title, "mean occlusion", "recall", series, (0.0, 1.0, 0.0, 1.05))
+    return Plot(table.title, "mean occlusion", "recall", series, (0.0, 1.0, 0.0, 1.0))
 
 
 def matching_table(by_distance: Scores, by_volume: Mapping[float, Scores | None]) -> Table:

@@ -61,7 +61,7 @@ def position_claims(case: Case, pairs: Pairs) -> tuple[np.ndarray, np.ndarray]:
 
 
 def size_claims(pairs: Pairs) -> tuple[np.ndarray, np.ndarray]:
-    """(N, 3) errors of extents, compared sorted (`object_errors`), and their (N, 3, 3) covariances, metres; objects of
+    """(N, 3) errors of extents, compared sorted (`things.errors`), and their (N, 3, 3) covariances, metres; objects of
     unknown size are left out."""
     sized = [(thing.thing, true.size) for thing, true in pairs if np.isfinite(true.size).all()]
     errors = [in_sorted_order(thing.size, thing.size) - in_sorted_order(size, size) for thing, size in sized]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thingmap.datasets.errors import UserError
+from thingmap.datasets.errors import InputError, UserError
 from thingmap.datasets.frame import BrokenFrame, Frame, FrameProblem, Intrinsics
 from thingmap.datasets.ground_truth import GroundTruth
 from thingmap.datasets.truth import FrameTruth, TrueObject
@@ -135,6 +135,15 @@ def test_facts_are_for_people(out: Path, scene_truth, monkeypatch) -> None:
 def test_a_truth_that_does_not_fit_is_refused(out: Path, scene_truth) -> None:
     with pytest.raises(UserError, match="no common frame"):
         evaluate_run(out, replace(scene_truth, stamps=scene_truth.stamps + 50.0))
+
+
+def test_a_damaged_cloud_is_refused_and_an_absent_one_is_not(out: Path, scene_truth) -> None:
+    cloud = out / "cloud.ply"
+    cloud.write_bytes(cloud.read_bytes()[:2000])
+    with pytest.raises(InputError, match=r"cloud\.ply"):
+        evaluate_run(out, scene_truth)
+    cloud.unlink()
+    assert "no cloud" in evaluate_run(out, scene_truth).skipped["lai"]
 
 
 def test_the_detector_of_the_run_is_the_one_under_test(with_images, run_with) -> None:

@@ -145,7 +145,7 @@ def test_objects_of_a_frame():
         object_id=np.array([8, 99, 7]),  # 99 is clutter
         xyxy=np.array([[-20.0, 0.0, 20.0, 10.0], [0.0, 0.0, 9.0, 9.0], [5.0, 5.0, 15.0, 200.0]]),
         xyxy_visible=np.array([[-0.5, 0.0, 20.0, 10.0], [0.0, 0.0, 9.0, 9.0], [np.nan] * 4]),
-        visibility=np.array([0.5, 1.0, 0.1]),
+        visibility=np.array([0.25, 1.0, 0.1]),
     )
     boxes = true_boxes(seen, truth_of("bowl", "cup"), CAMERA, 0.25)
     assert boxes.object_id.tolist() == [8, 7]

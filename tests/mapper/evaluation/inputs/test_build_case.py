@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from thingmap.datasets.errors import UserError
+from thingmap.datasets.folder_truth import FolderWithTruth
 from thingmap.datasets.truth import NO_OBJECT
 from thingmap.mapper.evaluation.config import EvaluationConfig
 from thingmap.mapper.evaluation.inputs.build_case import build_case
 from thingmap.mapper.evaluation.inputs.placing import restrict_classes
 from thingmap.mapper.map.boxes import box_corners
+
+
+class Rendered(FolderWithTruth):
+    """A folder with truth of which nothing is read."""
+
+    def __post_init__(self) -> None:
+        pass
 
 
 def calling(run, names: dict[str, str]):
@@ -124,6 +132,19 @@ def test_what_was_mapped_beyond_the_truth_is_noted(scene_truth, perfect_run) -> 
     run = replace(run, report={**run.report, "stopped": "interrupted at frame 40"})
     notes = " ".join(build_case(run, shorter).notes)
     assert "10 of 40 mapped frames" in notes and "interrupted at frame 40" in notes
+
+
+def test_a_map_of_a_sequence_of_another_name_is_noted(scene_truth, perfect_run) -> None:
+    run = perfect_run(scene_truth)
+    (note,) = build_case(run, replace(scene_truth, name="kitchen", sequence=object())).notes
+    assert "made of eight boxes" in note and "that of kitchen" in note
+    rendered = Rendered(**{field.name: None for field in fields(Rendered)} | {"source": "eight boxes"})
+    for truth in (
+        replace(scene_truth, sequence=object()),
+        replace(scene_truth, name="truth.json"),
+        replace(scene_truth, name="folder", sequence=rendered),  # from the line of which the map was made
+    ):
+        assert build_case(run, truth).notes == ()
 
 
 def test_restricting_leaves_other_classes_unlabelled(scene_truth, perfect_run) -> None:

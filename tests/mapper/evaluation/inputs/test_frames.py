@@ -88,6 +88,23 @@ def test_another_world_is_refused_with_the_differences(scene_truth, perfect_run)
         aligned(in_dataset_axes(run, turned), scene_truth)
 
 
+def of_sequence(truth, name: str):
+    """The truth as that of a sequence of this name."""
+    return replace(truth, name=name, sequence=object())
+
+
+def test_a_map_of_another_sequence_must_fit_its_path(scene_truth, perfect_run) -> None:
+    """The middle camera is a metre off once the path is aligned: the same scene mapped badly, or another scene."""
+    run = perfect_run(scene_truth)  # made of "eight boxes"
+    lost = run.poses.copy()
+    lost[::2, :3, 3] += [2.0, 0.0, 0.0]
+    with pytest.raises(UserError, match=r"made of eight boxes, not of kitchen.*1\.00 m and 0 degrees.*0\.5 m"):
+        aligned(replace(run, poses=lost), of_sequence(scene_truth, "kitchen"))
+    for truth in (of_sequence(scene_truth, "eight boxes"), replace(scene_truth, name="groundtruth.txt")):
+        aligned(replace(run, poses=lost), truth)  # to be measured, not refused
+    aligned(run, of_sequence(scene_truth, "kitchen"))
+
+
 def test_without_true_poses_only_a_map_in_the_axes_of_the_dataset_can_be_judged(scene_truth, perfect_run) -> None:
     run, truth = perfect_run(scene_truth), replace(scene_truth, poses=None)
     with pytest.raises(UserError, match=r"first camera.*--odometry poses"):

@@ -12,6 +12,7 @@ from plyfile import PlyData, PlyElement
 from thingmap.datasets.errors import InputError
 from thingmap.datasets.truth import NO_OBJECT
 from thingmap.mapper.evaluation.inputs.load_run import load_run
+from thingmap.mapper.evaluation.result import NotEvaluated
 from thingmap.mapper.map.store import OutputFolder
 
 GREY = 127
@@ -84,7 +85,7 @@ def test_what_is_optional_may_be_absent(out: Path) -> None:
     (out / "cloud.ply").unlink()
     loaded = load_run(out)
     assert loaded.snapshots == () and loaded.keyframes is None
-    with pytest.raises(InputError, match=r"cloud\.ply"):
+    with pytest.raises(NotEvaluated, match=r"cloud\.ply"):
         loaded.cloud()
 
 
@@ -130,6 +131,9 @@ def test_a_folder_without_a_map_is_refused(tmp_path: Path) -> None:
         ({"file": "../map.json"}, "beside it"),
         ({"frames": -1}, "whole number"),
         ({"frames": 7}, "two after 7"),
+        ({"frames": 0}, "after 0 frames"),
+        ({"frames": 4}, "after 4 frames at 100.2"),
+        ({"frames": 41}, "40 frames of trajectory"),
         ({"stamp": "now"}, "a number"),
         ({"T_world_camera": [[1.0] * 4] * 4}, "000003"),
         ({"T_world_camera": [[1.0] * 4] * 3}, "4 x 4"),

@@ -99,19 +99,40 @@ def test_points_far_from_the_truth_are_left_out(perfect_run, scene_truth, make_c
     assert "100 of" in " ".join(result.notes(0.03))
 
 
+@pytest.mark.parametrize(("distance", "judged"), [(0.0299, 1), (0.0301, 0)])
+def test_near_means_within_the_distance_of_the_evaluator(perfect_run, scene_truth, make_case, distance, judged):
+    lonely = PointTruth(np.array([[5.0, 5.0, 5.0], [7.0, 7.0, 7.0]], dtype=np.float32), np.array([0, 0]), None)
+    truth, T = replace(scene_truth, point_truth=lambda: lonely), np.linalg.inv(scene_truth.poses[0])
+    world = lonely.points[:1] + np.array([[distance, 0.0, 0.0]])
+    points = np.concatenate([world, lonely.points[1:]]) @ T[:3, :3].T + T[:3, 3]
+    result = label_points(make_case(replace(perfect_run(truth), cloud=lambda: (points, None)), truth))
+    assert (len(result.true), result.left_out) == (1 + judged, 1 - judged)
+    assert result.covered == (1 + judged) / 2
+
+
+def test_clouds_are_aligned_by_all_poses_not_by_the_first(perfect_run, scene_truth, make_case):
+    run = perfect_run(scene_truth, labelled=True)
+    poses = run.poses.copy()
+    poses[0, :3, 3] += 0.5
+    points = label_points(make_case(replace(run, poses=poses), scene_truth))
+    assert points.left_out == 0
+    assert np.mean(points.found == points.true) > 0.85  # all poses are off by 2 cm, which is the half metre over 40
+
+
 def test_what_is_missing_is_said(perfect_run, scene_truth, make_case):
     run = perfect_run(scene_truth)
     case = make_case(run, scene_truth)
 
-    def no_cloud():
-        raise InputError("out/cloud.ply", "a cloud", "no file", "map again")
+    def damaged():
+        raise InputError("out/cloud.ply", "a cloud", "half of one", "map again")
 
     points, _ = run.cloud()
     for changed, reason in [
         (replace(case, truth=replace(scene_truth, point_truth=None)), "no labelled points"),
-        (replace(case, run=replace(run, cloud=no_cloud)), "out/cloud.ply"),
         (replace(case, run=replace(run, cloud=lambda: (points + 9.0, None))), "within 3 cm"),
         (replace(case, run=replace(run, cloud=lambda: (points[:0], None))), "none of the 0 points"),
     ]:
         with pytest.raises(NotEvaluated, match=reason):
             label_points(changed)
+    with pytest.raises(InputError, match="half of one"):  # no map is judged by what is left of it
+        label_points(replace(case, run=replace(run, cloud=damaged)))

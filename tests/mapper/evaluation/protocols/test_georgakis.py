@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thingmap.datasets.errors import InputError
+from thingmap.datasets.truth import NO_OBJECT
 from thingmap.detectors.detections import Detections
 from thingmap.mapper.evaluation.config import EvaluationConfig
 from thingmap.mapper.evaluation.protocols.georgakis import evaluate
@@ -101,6 +101,29 @@ def test_a_missing_thing_costs_recall_only(judge):
     assert [case.text.split(" is ")[0] for case in result.worst] == ["bowl 0"]
 
 
+def test_the_table_averages_classes_that_are_there(perfect_run, scene_truth, change_things, make_case):
+    run, truth = perfect_run(scene_truth), replace(scene_truth, classes=(*scene_truth.classes, "teapot"))
+    result = evaluate(make_case(change_things(run, run.object_map.things[1:]), truth))
+    boxes = next(table for table in result.tables if table.title.startswith("Boxes"))
+    assert [row[0] for row in boxes.rows] == [*scene_truth.classes, "mean of classes", "all classes"]
+    assert boxes.rows[-2][5:] == (pytest.approx(3.5 / 4), 1.0, pytest.approx(3.5 / 4))
+
+
+def test_worst_cases_are_shown_where_they_are_seen_best(perfect_run, scene_truth, change_things, make_case):
+    look = scene_truth.frame_truth
+
+    def dim(index):
+        visibility = np.where(look(index).object_id == 0, 0.9 if index == 20 else 0.5, 1.0)
+        return replace(look(index), visibility=visibility)
+
+    run, truth = perfect_run(scene_truth), replace(scene_truth, frame_truth=dim)
+    before_camera_15 = run.poses[15, :3, 3] + 0.5 * run.poses[15, :3, 2]
+    phantom = replace(run.object_map.things[6], id="phantom", position=before_camera_15)
+    false, missed = evaluate(make_case(change_things(run, (*run.object_map.things[1:], phantom)), truth)).worst
+    assert (false.text.split(":")[0], false.frame) == ("phantom", 15)
+    assert (missed.text.split(" is ")[0], missed.frame) == ("bowl 0", 20)
+
+
 def test_a_shifted_map_finds_nothing(judge):
     result = judge(lambda things: tuple(replace(t, position=t.position + np.array([0.25, 0.0, 0.0])) for t in things))
     precision, recall = multi_view(result)
@@ -188,6 +211,24 @@ def test_poses_of_the_truth_are_not_needed(judge, perfect_run, scene_truth, make
     assert "labelled points" in " ".join(result.notes)
 
 
+def test_a_run_over_some_frames_is_judged_in_those_with_its_own_poses(judge, perfect_run, scene_truth, make_case):
+    run = perfect_run(scene_truth)
+    half = replace(run, stamps=run.stamps[::2], poses=run.poses[::2])
+    result = evaluate(make_case(half, scene_truth))
+    assert multi_view(result) == (1.0, 1.0)
+    assert row(result, "Boxes", "all classes")[1] == 8 * FRAMES / 2  # frames 0, 10, 20 and 30
+
+
+def test_points_are_averaged_with_the_background(perfect_run, scene_truth, make_case):
+    """The second soda can is lost in the background."""
+    run, true = perfect_run(scene_truth, labelled=True), scene_truth.point_truth()
+    lost, cans, background = (np.sum(a == b) for a, b in ((true.object_id, 7), (true.class_id, 3), (true.class_id, -1)))
+    labels = np.where(true.object_id == 7, NO_OBJECT, true.class_id)
+    result = evaluate(make_case(replace(run, cloud=lambda: (run.cloud()[0], labels)), scene_truth))
+    assert result.value("point precision") == pytest.approx((4 + background / (background + lost)) / 5)
+    assert result.value("point recall") == pytest.approx((4 + 1 - lost / cans) / 5)
+
+
 def test_points_alone(judge, perfect_run, scene_truth, make_case):
     run = perfect_run(scene_truth, labelled=True)
     result = evaluate(make_case(run, replace(scene_truth, frame_truth=None)))
@@ -197,7 +238,7 @@ def test_points_alone(judge, perfect_run, scene_truth, make_case):
 
 def test_nothing_to_judge_by_says_why(perfect_run, scene_truth, make_case):
     def no_cloud():
-        raise InputError("out/cloud.ply", "a cloud", "no file", "map again")
+        raise NotEvaluated("the run has no cloud")
 
     run = replace(perfect_run(scene_truth), cloud=no_cloud)
     with pytest.raises(NotEvaluated, match=r"boxes: .*every object.*points: .*cloud"):

@@ -67,6 +67,22 @@ def test_existence_of_duplicates_and_phantoms_by_hand(score, perfect):
     assert not any("--all" in note for note in result.notes)
 
 
+def test_a_ghost_nearer_to_the_object_does_not_take_it_from_the_thing_that_is_sure(score, perfect):
+    sure, ghost = saying(perfect.object_map.things[0], 0.9), saying(perfect.object_map.things[0], 0.2)
+    result = score([replace(sure, position=sure.position + 0.01), replace(ghost, id="ghost")])
+    assert result.value("existence log loss") == pytest.approx(-np.log([0.9, 0.8]).mean())
+
+
+def test_positions_are_judged_relative_to_the_first_pose(scene_truth, perfect, make_case):
+    """An error of the first pose alone is one of all positions: the map claims them relative to it."""
+    poses = perfect.poses.copy()
+    poses[0, :3, 3] += [0.03, 0.0, 0.0]
+    things = [replace(t, position_covariance=0.01**2 * np.eye(3)) for t in perfect.object_map.things]
+    object_map = replace(perfect.object_map, things=tuple(things))
+    result = evaluate(make_case(replace(perfect, poses=poses, object_map=object_map), scene_truth))
+    assert result.value("position NEES") == pytest.approx((0.03 / 0.01) ** 2 / 3)
+
+
 def test_classes_by_hand(score, perfect):
     bowls = perfect.object_map.things[:2]
     things = [saying(bowls[0], bowl=0.8, cup=0.2), saying(bowls[1], bowl=0.3, cup=0.6, soda_can=0.1)]

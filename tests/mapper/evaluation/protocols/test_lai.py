@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from worlds import TABLE_HEIGHT
 
 from thingmap.datasets.truth import NO_OBJECT
+from thingmap.mapper.evaluation.config import EvaluationConfig
 from thingmap.mapper.evaluation.points.label_scores import mean_f, mean_precision, mean_recall, score_labels
 from thingmap.mapper.evaluation.protocols.lai import evaluate, random_labels
 
@@ -99,6 +101,24 @@ def test_a_wrong_label_costs_exactly_its_points(perfect_run, scene_truth, change
     assert result.value("micro F") == pytest.approx(1.0 - lost / len(true.points))
     f_scores = (1.0, 1.0, 2 * cups / (2 * cups + lost), 2 * (cans - lost) / (2 * cans - lost))
     assert result.value("macro F") == pytest.approx(np.mean(f_scores))
+    assert result.value("macro F with background") == pytest.approx(np.mean([*f_scores, 1.0]))
+    assert result.value("overall precision") == pytest.approx((4 + cups / (cups + lost)) / 5)
+    assert result.value("overall recall") == pytest.approx((4 + 1 - lost / cans) / 5)
+
+
+def test_a_cloud_that_leaves_objects_out_gains_nothing_unseen(perfect_run, scene_truth, make_case):
+    """Without the points of one box all labels are right, but the share of points that the map has tells it."""
+    run, true = perfect_run(scene_truth, labelled=True), scene_truth.point_truth()
+    points, labels = run.cloud()
+    kept = true.object_id != 2
+    result = evaluate(make_case(replace(run, cloud=lambda: (points[kept], labels[kept])), scene_truth))
+    assert result.value("macro F") == 1.0
+    # Only the lowest points of the box are near others, those of the table.
+    wanted = true.object_id >= 0
+    low = (true.object_id == 2) & (true.points[:, 2] < TABLE_HEIGHT + EvaluationConfig().point_distance)
+    covered = result.value("object points covered")
+    assert np.mean(kept[wanted]) <= covered <= np.mean((kept | low)[wanted])
+    assert evaluate(make_case(run, scene_truth)).value("object points covered") == 1.0
 
 
 def test_a_shifted_map_loses_points_and_an_empty_one_is_all_background(

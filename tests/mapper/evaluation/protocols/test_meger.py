@@ -133,9 +133,9 @@ def test_lengths_that_cannot_be_judged_are_named(perfect_run, scene_truth, make_
     run = perfect_run(scene_truth)
     whole = scene_truth.frame_truth
     truth = replace(scene_truth, frame_truth=lambda index: None if index == 3 else whole(index))
-    short = replace(run, stamps=run.stamps[:11], poses=run.poses[:11], snapshots=run.snapshots[:12])
+    short = replace(run, stamps=run.stamps[:12], poses=run.poses[:12], snapshots=run.snapshots[:12])
     result = evaluate(make_case(short, truth))
-    assert recalls(result) == [None, 1.0, 1.0, None]
+    assert recalls(result) == [None, 1.0, 1.0, None]  # after 10 views the last frame is judged, after 12 none is left
     notes = " ".join(result.notes)
     assert "3 views: the next frame is not annotated" in notes
     assert "12 views: no frame was mapped after them" in notes
@@ -146,6 +146,19 @@ def test_lengths_that_cannot_be_judged_are_named(perfect_run, scene_truth, make_
     with pytest.raises(NotEvaluated, match="followed by a view"):
         config = EvaluationConfig(path_lengths=(40,), explicit_lengths=())
         evaluate(make_case(last, scene_truth, config=config))
+
+
+def test_curves_are_drawn_from_nothing_to_all_and_hold_until_the_border(judge):
+    """One object is missed; two false positives rank last."""
+    result = judge(
+        lambda things: (*things[1:], *(replace(t, id=f"again-{k}", existence=0.5) for k, t in enumerate(things[1:3])))
+    )
+    curves = {plot.title.split(": ")[-1]: plot for plot in result.plots[:-1]}
+    assert curves[ALL].limits == (0.0, 2.0, 0.0, 1.0) and curves["soda can"].limits == (0.0, 1.0, 0.0, 1.0)
+    for series in curves[ALL].series:
+        assert series.x == (0.0, 0.0, 2.0, 2.0) and series.y == (0.0, *[pytest.approx(7 / 8)] * 3)
+    empty = judge(lambda things: ())
+    assert {series.y for plot in empty.plots[:-1] for series in plot.series} == {(0.0, 0.0)}
 
 
 def test_scenes_are_pooled_from_results_and_from_reports(judge):

@@ -171,6 +171,9 @@ def test_sizes_twice_too_large(score, perfect):
     assert result.value("volume IoU") == pytest.approx(1 / 8)
     assert result.value("detection F1") == 1.0 and result.value("detection F1, IoU 0.25") == 0.0
     assert table(result, "Size errors")["height"]["median ln(thing / object)"] == pytest.approx(np.log(2.0))
+    height = table(score([replace(t, size=0.5 * t.size) for t in perfect.object_map.things]), "Size errors")["height"]
+    assert height["median ln(thing / object)"] == pytest.approx(-np.log(2.0))
+    assert height["median |ln|"] == pytest.approx(np.log(2.0))
 
 
 def test_axes_named_the_other_way_round_are_the_same_box(score, perfect):
@@ -203,6 +206,22 @@ def test_objects_that_could_not_be_seen_do_not_count(score, scene_truth, perfect
         assert result.value("true objects") == result.value("claimed things") == 7
         assert result.value("joint F1") == result.value("count ratio") == 1.0
         assert any(note.endswith("16 pixels large: 1.") for note in result.notes)
+        boxes = table(result, "Objects by class")["cereal box"]
+        assert boxes["objects"] == boxes["things"] == boxes["found"] == boxes["joint F1"] == 1
+
+
+def test_one_object_of_unknown_size_leaves_no_score_by_volume(score, scene_truth):
+    """Nor if it need not be found: its thing would be false, as nothing tells by volume what it stands for."""
+    look = scene_truth.frame_truth
+
+    def hidden(index):
+        return replace(look(index), visibility=np.where(look(index).object_id == 3, 0.0, 1.0))
+
+    objects = tuple(replace(t, size=np.full(3, np.nan)) if t.id == 3 else t for t in scene_truth.objects)
+    result = score(truth=replace(scene_truth, objects=objects, frame_truth=hidden))
+    assert result.value("detection recall") == 1.0
+    assert result.value("detection precision") == 1.0
+    assert result.value("detection F1, IoU 0.5") is None
 
 
 def test_recall_by_occlusion(score, scene_truth, perfect):
@@ -232,6 +251,7 @@ def test_an_incomplete_truth_has_no_precision_but_knows_false_detections(score, 
         TrueObject(10, "soda can", scene_truth.objects[6].position + 0.14 * scene_truth.up, unknown, 0.0),
         TrueObject(11, "soda can", scene_truth.objects[7].position + 0.16 * scene_truth.up, unknown, 0.0),
         TrueObject(12, "microwave", scene_truth.objects[5].position, unknown, 0.0),
+        TrueObject(13, "microwave", scene_truth.objects[6].position, unknown, 0.0),  # where a soda can is believed
     )
     truth = replace(
         scene_truth,
@@ -254,6 +274,8 @@ def test_an_incomplete_truth_has_no_precision_but_knows_false_detections(score, 
         assert result.value(name) is None, name
     assert result.value("joint recall") == 1.0
     assert result.value("believed false detections") == 1  # the second is 16 cm away, nothing is called a microwave
+    doubtful = [replace(t, existence=0.4) if t.id == "thing-0006" else t for t in perfect.object_map.things]
+    assert score(doubtful, truth).value("believed false detections") == 0
     wider = score(truth=replace(truth, tolerance={**truth.tolerance, 11: 0.2}))
     assert wider.value("believed false detections") == 2
     (shown,) = result.worst

@@ -120,9 +120,9 @@ def test_without_pictures_the_cases_are_told(report):
     assert "cup 3 was never found" in text and "frame 1" in text
 
 
-@pytest.mark.parametrize(("rows", "folded"), [(40, 0), (41, 1)])
-def test_long_tables_open_on_demand(rows, folded):
-    content = Table("Many", ("name", "value"), tuple((f"row {n}", n) for n in range(rows)))
+@pytest.mark.parametrize(("rows", "for_programs", "folded"), [(40, False, 0), (41, False, 1), (2, True, 1)])
+def test_long_tables_and_those_for_programs_open_on_demand(rows, for_programs, folded):
+    content = Table("Many", ("name", "value"), tuple((f"row {n}", n) for n in range(rows)), for_programs)
     result = replace(make_protocol(), tables=(content,))
     parsed = Page(render_page(make_report(result), {}))
     assert len(parsed.elements("details")) == folded and f"row {rows - 1}" in parsed.texts
@@ -140,7 +140,7 @@ def test_the_terminal_shows_every_metric(report, width):
     lines = out.getvalue().splitlines()
     assert max(map(len, lines)) <= width
     text = " ".join(out.getvalue().split())
-    for part in ("0.750", "0.0123", "1.50", "–", "not evaluated: lai"):
+    for part in ("note: 1 thing left out.", "0.750", "0.0123", "1.50", "–", "not evaluated: lai"):
         assert part in text
     if width == 80:
         assert any(line.split() == ["centre", "error", "0.0123", "m", "↓"] for line in lines)

@@ -64,11 +64,12 @@ def test_agrees_with_trying_all_assignments(cost, limit):
     assert cost[pairs[:, 0], pairs[:, 1]].sum() == pytest.approx(best[1], abs=1e-9)
 
 
-def test_reach_is_half_the_diagonal_a_tolerance_or_a_fixed_distance(case):
+def test_reach_is_half_the_diagonal_or_more_by_tolerance_or_a_fixed_distance(case):
     objects = case.truth.objects
-    unknown = replace(objects[2], size=np.full(3, np.nan))
-    truth = replace(case.truth, objects=(objects[0], objects[1], unknown), tolerance={1: 0.08})
-    expected = [np.linalg.norm(objects[0].size) / 2.0, 0.08, 0.15]
+    unsized = tuple(replace(true, size=np.full(3, np.nan)) for true in objects[3:5])
+    truth = replace(case.truth, objects=(*objects[:3], *unsized), tolerance={1: 0.01, 2: 5.0, 3: 0.08})
+    halves = [np.linalg.norm(true.size) / 2.0 for true in objects[:2]]
+    expected = [*halves, 5.0, 0.08, 0.15]
     np.testing.assert_allclose(reaches(replace(case, truth=truth)), expected)
 
 
@@ -123,6 +124,15 @@ def test_a_second_thing_is_a_duplicate_and_the_nearer_one_stays(case):
     far = replace(second, position=second.position + 5.0)
     matching = match_by_distance(case, (far, *case.things), all_count(case))
     assert not matching.duplicates and len(matching.false_positives) == 1
+
+
+def test_a_second_thing_on_what_need_not_be_found_is_false_but_no_duplicate(case):
+    counted = all_count(case)
+    counted[0] = False
+    second = replace(moved(case.things[0], [0.01, 0.0, 0.0]), thing=replace(case.things[0].thing, id="second"))
+    matching = match_by_distance(case, (second, *case.things), counted)
+    assert [thing.thing.id for thing in matching.false_positives] == ["second"]
+    assert not matching.duplicates
 
 
 def test_the_likelier_thing_chooses_first_even_if_it_is_farther(case):
