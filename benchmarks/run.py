@@ -14,7 +14,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -53,13 +53,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _all(done: str, work: Callable[..., None], calls: list[tuple[Any, ...]], workers: int) -> None:
     """Every call in a process of its own, so that peak memory is one run's and a later one finds nothing warm."""
     context, start = multiprocessing.get_context("spawn"), time.perf_counter()
-    with ProcessPoolExecutor(workers, mp_context=context, max_tasks_per_child=1) as pool:
-        pending = {pool.submit(work, *call): call for call in calls}
-        for number, future in enumerate(as_completed(pending), start=1):
-            future.result()
-            what = " ".join(part.name for part in pending[future] if isinstance(part, Scene | Variant))
+    with context.Pool(workers, maxtasksperchild=1) as pool:
+        for number, call in enumerate(pool.imap_unordered(partial(_call, work), calls), start=1):
+            what = " ".join(part.name for part in call if isinstance(part, Scene | Variant))
             minutes = (time.perf_counter() - start) / 60.0
             print(f"{done} {number}/{len(calls)} after {minutes:.1f} min: {what}", file=sys.stderr, flush=True)
+
+
+def _call(work: Callable[..., None], call: tuple[Any, ...]) -> tuple[Any, ...]:
+    work(*call)
+    return call
 
 
 def _show(

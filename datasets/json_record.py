@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -45,12 +46,31 @@ class JsonRecord:
 
     def text(self, key: str) -> str:
         value = self.anything(key)
+        if not isinstance(value, str):
+            raise self._wrong("a string at", self._at(key), value)
+        return value
+
+    def name(self, key: str) -> str:
+        """A text that is not empty."""
+        value = self.anything(key)
         if not isinstance(value, str) or not value:
             raise self._wrong("a name at", self._at(key), value)
         return value
 
+    def choice(self, key: str, allowed: Sequence[str]) -> str:
+        value = self.text(key)
+        if value not in allowed:
+            raise self._wrong("one of " + ", ".join(f'"{name}"' for name in allowed) + " at", self._at(key), value)
+        return value
+
     def texts(self, key: str) -> tuple[str, ...]:
-        """Strings that differ from each other."""
+        values = self.anything(key)
+        if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
+            raise self._wrong("a list of strings at", self._at(key), values)
+        return tuple(values)
+
+    def names(self, key: str) -> tuple[str, ...]:
+        """Texts that are not empty and differ from each other."""
         values = self.anything(key)
         if not isinstance(values, list) or not all(isinstance(value, str) and value for value in values):
             raise self._wrong("a list of names at", self._at(key), values)
@@ -74,20 +94,42 @@ class JsonRecord:
     def number(self, key: str, least: float = -np.inf) -> float:
         """A finite number greater than `least`."""
         value = self.anything(key)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value) or value <= least:
+        if not _is_number(value) or not -np.inf < value < np.inf or value <= least:
             bound = "" if least == -np.inf else f" > {least:g}"
             raise self._wrong(f"a number{bound} at", self._at(key), value)
-        return float(value)
+        with self.explaining():  # a whole number of hundreds of digits
+            return float(value)
 
     def vector(self, key: str, least: float = -np.inf) -> np.ndarray:
         """(3,) float64, finite, each greater than `least`."""
         value = self.anything(key)
-        numbers = isinstance(value, list) and all(isinstance(x, int | float) and not isinstance(x, bool) for x in value)
+        numbers = isinstance(value, list) and all(map(_is_number, value))
         vector = np.array(value if numbers else [], dtype=np.float64)
         if vector.shape != (3,) or not np.isfinite(vector).all() or (vector <= least).any():
             bound = "" if least == -np.inf else f" > {least:g}"
             raise self._wrong(f"three numbers{bound} at", self._at(key), value)
         return vector
+
+    def array(self, key: str, shape: tuple[int, ...]) -> np.ndarray:
+        """float64 array of exactly this shape; values may be any numbers that JSON can hold."""
+        value = self.anything(key)
+        try:
+            array = np.asarray(value)
+        except ValueError:  # a ragged list
+            array = np.asarray(None)
+        if array.shape != shape or array.dtype.kind not in "if":
+            raise self._wrong(f"{' x '.join(map(str, shape))} numbers at", self._at(key), value)
+        return array.astype(np.float64)
+
+    def numbers_by_name(self, key: str) -> dict[str, float]:
+        """An object of numbers, any that JSON can hold."""
+        values = self.anything(key)
+        if not isinstance(values, dict):
+            raise self._wrong("an object of numbers at", self._at(key), values)
+        for name, value in values.items():
+            if not _is_number(value):
+                raise self._wrong("a number at", f"{self._at(key)}.{name}", value)
+        return {name: float(value) for name, value in values.items()}
 
     def vector_or_unknown(self, key: str, least: float = -np.inf) -> np.ndarray:
         """As `vector`; NaN where the value is null."""
@@ -103,13 +145,26 @@ class JsonRecord:
         for index, value in enumerate(values):
             yield JsonRecord(value, self._file, self._remedy, f"{self._at(key)}[{index}]")
 
+    @contextmanager
+    def explaining(self) -> Iterator[None]:
+        """A `ValueError` of what is built from this object becomes an `InputError` about it."""
+        try:
+            yield
+        except (ValueError, OverflowError) as error:
+            expected = f"valid values at {self._place or 'the top'}"
+            raise InputError(self._file, expected, str(error), self._remedy) from None
+
     def _at(self, key: str) -> str:
         return f"{self._place}.{key}" if self._place else key
 
     def _wrong(self, expected: str, place: str, value: Any) -> InputError:
-        text = value if isinstance(value, str) else json.dumps(value, default=repr)
+        text = json.dumps(value, ensure_ascii=False, default=repr)
         found = text if len(text) <= 60 else f"{text[:57]}..."
-        return InputError(self._file, f"{expected} {place}", found or "nothing", self._remedy)
+        return InputError(self._file, f"{expected} {place}", found, self._remedy)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def read_json_record(path: Path, expected: str, remedy: str) -> JsonRecord:

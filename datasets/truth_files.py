@@ -118,7 +118,7 @@ def read_record(path: Path) -> TruthRecord:
     if "schema" not in record or record.anything("schema") != SCHEMA:
         found = repr(record.anything("schema")) if "schema" in record else "none"
         raise InputError(path, f'the schema "{SCHEMA}"', found, REMEDY)
-    classes = record.texts("classes")
+    classes = record.names("classes")
     objects = tuple(_thing(item) for item in record.records("objects"))
     clutter = tuple(_thing(item) for item in record.records("clutter"))
     ids = [thing.id for thing in (*objects, *clutter)]
@@ -129,14 +129,14 @@ def read_record(path: Path) -> TruthRecord:
     configuration = record.anything("configuration")
     if not isinstance(configuration, dict):
         raise InputError(path, "an object at configuration", json.dumps(configuration)[:60], REMEDY)
-    names = record.texts("names")
+    names = record.names("names")
     if paths := [name for name in names if Path(name).name != name]:  # they are stems of files that may be replaced
         raise InputError(path, "names of frames without a folder", repr(paths[0]), REMEDY)
     up = record.vector("up")
     if abs(np.linalg.norm(up) - 1.0) > 1e-6:
         raise InputError(path, "a vector of length 1 at up", str(up.tolist()), REMEDY)
     return TruthRecord(
-        source=record.text("source"),
+        source=record.name("source"),
         up=up,
         classes=classes,
         objects=objects,
@@ -188,4 +188,4 @@ def _numbers(vector: np.ndarray) -> list[float] | None:
 
 def _thing(item: JsonRecord) -> TrueObject:
     position, size = item.vector_or_unknown("position"), item.vector_or_unknown("size", least=0.0)
-    return TrueObject(item.count("id"), item.text("label"), position, size, item.number("yaw"))
+    return TrueObject(item.count("id"), item.name("label"), position, size, item.number("yaw"))

@@ -79,16 +79,16 @@ def truth_of_known_objects(path: Path) -> GroundTruth:
 
 
 def _object(item: JsonRecord, number: int) -> KnownObject:
-    return KnownObject(item.text("name"), _thing(item, number), item.number("tolerance", least=0.0))
+    return KnownObject(item.name("name"), _thing(item, number), item.number("tolerance", least=0.0))
 
 
 def _false_detection(item: JsonRecord, number: int) -> KnownObject:
     tolerance = item.number("tolerance", least=0.0) if "tolerance" in item else 0.0
-    instead = item.text("truth") if "truth" in item else "nothing"
-    return KnownObject(f"no {item.text('class')}: {instead}", _thing(item, number), max(tolerance, FALSE_RADIUS))
+    instead = item.name("truth") if "truth" in item else "nothing"
+    return KnownObject(f"no {item.name('class')}: {instead}", _thing(item, number), max(tolerance, FALSE_RADIUS))
 
 
 def _thing(item: JsonRecord, number: int) -> TrueObject:
     size = item.vector("size", least=0.0) if "size" in item else np.full(3, np.nan)
     yaw = item.number("yaw") if "yaw" in item else 0.0
-    return TrueObject(number, item.text("class"), item.vector("position"), size, yaw)
+    return TrueObject(number, item.name("class"), item.vector("position"), size, yaw)

@@ -11,14 +11,15 @@ from typing import Any
 import numpy as np
 
 from ...datasets.errors import InputError
+from ...datasets.json_record import JsonRecord
 from .atomic import make_folder, write_atomic
 from .object_map import MapFrame, ObjectMap, UpDirection
-from .record import Record
 from .thing import Evidence, Thing
 
 SCHEMA = "thingmap/1"
 FILE_NAME = "map.json"
 DOUBTFUL_BELOW = 0.5  # existence: what more likely is not there is not written, unless asked for
+REMEDY = "correct that value or write the map again with `thingmap run`"
 NEGLIGIBLE = 1e-4  # class probability that is not written
 
 
@@ -77,7 +78,7 @@ def to_document(object_map: ObjectMap, include_doubtful: bool = False) -> dict[s
 
 def from_document(document: Any, file: Path) -> ObjectMap:
     """The inverse of `to_document`; `file` is named in errors, which are `InputError`."""
-    root = Record(document, file)
+    root = JsonRecord(document, file, REMEDY)
     if root.text("schema") != SCHEMA:
         remedy = "open it with the version of thingmap that wrote it"
         raise InputError(file, f'the schema "{SCHEMA}"', repr(root.text("schema")), remedy)
@@ -129,7 +130,7 @@ def thing_to_dict(thing: Thing) -> dict[str, Any]:
     }
 
 
-def _thing_from(record: Record) -> Thing:
+def _thing_from(record: JsonRecord) -> Thing:
     evidence = record.record("evidence")
     with record.explaining():
         return Thing(
@@ -149,7 +150,7 @@ def _thing_from(record: Record) -> Thing:
         )
 
 
-def _up_from(record: Record) -> UpDirection:
+def _up_from(record: JsonRecord) -> UpDirection:
     with record.explaining():
         return UpDirection(
             record.array("direction", (3,)), float(np.radians(record.number("std_deg"))), record.text("source")

@@ -35,7 +35,17 @@ def test_overwriting_replaces_our_files_and_nothing_else(tmp_path, fake_mapper, 
         mapper.process_frame(frame)
     save_run(folder, mapper, report, config="seed: 0\n", command={"sequence": "tiny"})
     assert sorted(path.name for path in tmp_path.iterdir()) == [
-        *("cloud.ply", "config.yaml", "ledger.npz", "map.json", "mine.txt", "report.json", "sub", "trajectory.txt")
+        *(
+            "cloud.ply",
+            "config.yaml",
+            "keyframes.npz",
+            "ledger.npz",
+            "map.json",
+            "mine.txt",
+            "report.json",
+            "sub",
+            "trajectory.txt",
+        )
     ]
     assert (tmp_path / "mine.txt").read_text() == "mine"
     assert len(folder.read_map()) == 3

@@ -23,10 +23,10 @@ from zipfile import BadZipFile
 import numpy as np
 
 from ....datasets.errors import InputError
+from ....datasets.json_record import JsonRecord
 from ....datasets.poses import nearest_rotations, read_tum_poses
 from ....datasets.truth import NO_OBJECT
 from ...map.object_map import ObjectMap
-from ...map.record import Record
 from ...map.store import AGAIN, OutputFolder
 from ..result import NotEvaluated
 from .case import KeyframePoses, MappedRun, Snapshot
@@ -70,7 +70,7 @@ def _read_snapshots(folder: Path, stamps: np.ndarray) -> tuple[Snapshot, ...]:
     if not index.is_file():
         return ()
     try:
-        root = Record(json.loads(index.read_text(encoding="utf-8")), index)
+        root = JsonRecord(json.loads(index.read_text(encoding="utf-8")), index, AGAIN)
     except (OSError, ValueError) as error:
         raise InputError(index, "an index of snapshots in JSON", str(error), AGAIN) from None
     if root.text("schema") != SNAPSHOT_SCHEMA:
@@ -87,7 +87,7 @@ def _read_snapshots(folder: Path, stamps: np.ndarray) -> tuple[Snapshot, ...]:
     return tuple(snapshots)
 
 
-def _read_snapshot(index: Path, record: Record) -> Snapshot:
+def _read_snapshot(index: Path, record: JsonRecord) -> Snapshot:
     name = record.text("file")
     if Path(name).name != name:
         raise InputError(index, "names of files beside it", repr(name), AGAIN)
