@@ -79,7 +79,7 @@ class JsonRecord:
             raise self._wrong("names that differ at", self._at(key), f"{twice} twice")
         return tuple(values)
 
-    def truth(self, key: str) -> bool:
+    def flag(self, key: str) -> bool:
         value = self.anything(key)
         if not isinstance(value, bool):
             raise self._wrong("true or false at", self._at(key), value)
@@ -97,14 +97,15 @@ class JsonRecord:
         if not _is_number(value) or not -np.inf < value < np.inf or value <= least:
             bound = "" if least == -np.inf else f" > {least:g}"
             raise self._wrong(f"a number{bound} at", self._at(key), value)
-        with self.explaining():  # a whole number of hundreds of digits
+        with self.explaining():  # as in `vector`
             return float(value)
 
     def vector(self, key: str, least: float = -np.inf) -> np.ndarray:
         """(3,) float64, finite, each greater than `least`."""
         value = self.anything(key)
         numbers = isinstance(value, list) and all(map(_is_number, value))
-        vector = np.array(value if numbers else [], dtype=np.float64)
+        with self.explaining():  # a whole number of hundreds of digits
+            vector = np.array(value if numbers else [], dtype=np.float64)
         if vector.shape != (3,) or not np.isfinite(vector).all() or (vector <= least).any():
             bound = "" if least == -np.inf else f" > {least:g}"
             raise self._wrong(f"three numbers{bound} at", self._at(key), value)
@@ -129,7 +130,8 @@ class JsonRecord:
         for name, value in values.items():
             if not _is_number(value):
                 raise self._wrong("a number at", f"{self._at(key)}.{name}", value)
-        return {name: float(value) for name, value in values.items()}
+        with self.explaining():  # as in `vector`
+            return {name: float(value) for name, value in values.items()}
 
     def vector_or_unknown(self, key: str, least: float = -np.inf) -> np.ndarray:
         """As `vector`; NaN where the value is null."""
@@ -181,4 +183,6 @@ def read_json_record(path: Path, expected: str, remedy: str) -> JsonRecord:
         raise InputError(path, expected, found, remedy) from None
     except RecursionError:
         raise InputError(path, expected, "JSON that is nested too deeply", remedy) from None
+    except ValueError:  # thousands of digits, which Python refuses to turn into a number
+        raise InputError(path, expected, "a number of too many digits", remedy) from None
     return JsonRecord(value, path, remedy)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from . import folder, rgbd_scenes_v1, rgbd_scenes_v2, seven_scenes, tum, tum_keyframes
 from .errors import InputError, UserError
+from .paths import user_path
 from .sequence import Sequence
 from .views import subset
 
@@ -70,7 +71,7 @@ def open_sequence(
         from .synthetic.synth import open_synth  # slow to import, too
 
         return subset(open_synth(str(spec)), stride, max_frames)
-    loader, path = _choose(Path(spec).expanduser(), dataset)
+    loader, path = _choose(user_path(spec), dataset)
     return subset(loader.open(path), stride, max_frames)
 
 

@@ -11,6 +11,7 @@ from .errors import InputError
 from .folder_truth import FolderWithTruth
 from .ground_truth import GroundTruth
 from .open import LOADERS, SAMPLE_PREFIX, SYNTH_PREFIX, open_sequence
+from .paths import user_path
 from .poses import read_poses_at
 from .recorded import RecordedSequence
 from .rgbd_scenes_v1 import RgbdScenesV1
@@ -39,7 +40,8 @@ def open_truth(spec: str | Path, poses: Path | None = None) -> GroundTruth:
         spec: a line or a path, see `UNDERSTOOD`. A file of objects in the folder of a sequence brings the poses and
             images of that sequence, and the folder brings its file of objects (`objects_derived.json`).
         poses: a trajectory in the TUM format, or anything else understood here that has poses; they take the place of
-            the poses, if any, that `spec` brings. Where there are images, a trajectory is interpolated at their stamps.
+            the poses, if any, that `spec` brings. Where there are images, or truth by frame, a trajectory is
+            interpolated at the frames' stamps.
 
     Raises:
         InputError: there is no such thing, it is none of those understood, is damaged, or tells nothing.
@@ -47,7 +49,7 @@ def open_truth(spec: str | Path, poses: Path | None = None) -> GroundTruth:
     """
     truth = _open(str(spec))
     if poses is not None:
-        truth = _with_poses(truth, Path(poses).expanduser())
+        truth = _with_poses(truth, user_path(poses))
     if truth.poses is None and not truth.objects and truth.point_truth is None:
         found = "neither poses nor objects nor labelled points"
         raise InputError(str(spec), "something that is known of the scene", found, "give its truth, or its poses")
@@ -57,16 +59,17 @@ def open_truth(spec: str | Path, poses: Path | None = None) -> GroundTruth:
 def _open(spec: str) -> GroundTruth:
     if spec.startswith((SAMPLE_PREFIX, SYNTH_PREFIX)):
         return _truth_of_sequence(open_sequence(spec))
-    path = Path(spec).expanduser()
+    path = user_path(spec)
     if path.is_dir():
         return _truth_of_folder(path)
     table, _, video = spec.rpartition("#")
     if not path.exists() and table.endswith(".tsv"):
-        return truth_of_v1_boxes(Path(table).expanduser(), video)
+        return truth_of_v1_boxes(user_path(table), video)
     if not path.exists():
         raise InputError(path, UNDERSTOOD, "no such file or folder", "check the path")
-    if path == TruthPaths(path.parent).record and path.parent.name == FOLDER:
-        return _truth_of_folder(path.parent.parent)
+    folder = path.resolve().parent  # `truth.json` alone is meant in its folder too
+    if path.name == TruthPaths(folder).record.name and folder.name == FOLDER:
+        return _truth_of_folder(folder.parent)
     readers = {
         ".json": _truth_of_objects,
         ".txt": truth_of_trajectory,
@@ -157,14 +160,16 @@ def _with_poses(truth: GroundTruth, path: Path) -> GroundTruth:
     given = _open(str(path))
     if given.poses is None:
         raise InputError(path, "poses of the frames", "none", "give a trajectory, or the folder of a sequence with one")
-    if truth.sequence is not None and path.is_file() and path.suffix == ".txt":
+    # `frame_truth` counts by the frames of `truth`: under those of the poses it would tell of other images.
+    own_frames = truth.sequence is not None or truth.frame_truth is not None
+    if own_frames and path.is_file() and path.suffix == ".txt":
         return replace(truth, poses=read_poses_at(path, truth.stamps))
-    if truth.sequence is not None and len(given.poses) != len(truth.names):
+    if own_frames and len(given.poses) != len(truth.names):
         found = f"{len(given.poses)} poses"
         raise InputError(
             path, f"a pose for each of the {len(truth.names)} frames", found, "give poses of this sequence"
         )
-    if truth.sequence is not None:
+    if own_frames:
         return replace(truth, poses=given.poses)
     up = truth.up if truth.up is not None else given.up
     return replace(_objects_of(given, truth), name=truth.name, up=up, intrinsics=truth.intrinsics or given.intrinsics)

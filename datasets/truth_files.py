@@ -143,7 +143,7 @@ def read_record(path: Path) -> TruthRecord:
         clutter=clutter,
         configuration=configuration,
         names=names,
-        has_cloud=record.truth("cloud"),
+        has_cloud=record.flag("cloud"),
     )
 
 

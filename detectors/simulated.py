@@ -28,7 +28,7 @@ class SimulatedDetector:
         seed: of all its errors.
 
     Raises:
-        UserError: the sequence has no truth.
+        UserError: the sequence has no truth, the seed is negative, or nothing of the score is left for the true class.
     """
 
     def __init__(
@@ -43,6 +43,8 @@ class SimulatedDetector:
                 f"{name}: expected a sequence whose objects are known (such as sample:tabletop), found none known; "
                 "use a detector that looks at images"
             )
+        if seed < 0:
+            raise UserError(f"detector simulated: expected a seed >= 0, found {seed}; change it")
         self.config, self.seed = config, seed
         self.classes = sequence.classes
         self._sequence = sequence
@@ -72,6 +74,13 @@ class SimulatedDetector:
         c = self.config
         seen = _logistic((np.asarray(visibility) - c.half_visibility) / c.visibility_width + c.mood * mood)
         return c.max_recall * seen * _logistic(np.log2(np.asarray(side) / c.half_side) / c.side_width)
+
+    def mean_score(self, visibility: np.ndarray | float, side: np.ndarray | float, mood: float = 0.0) -> np.ndarray:
+        """Mean score of what is found; arguments as `find_probability`."""
+        c = self.config
+        low, high = c.score_range
+        seen = _logistic((np.asarray(visibility) - c.score_visibility) / c.score_visibility_width + 0.5 * c.mood * mood)
+        return low + (high - low) * seen * _logistic(np.log2(np.asarray(side) / c.score_side) / c.score_side_width)
 
     def _truth_of(self, frame: Frame) -> FrameTruth:
         """The frame's truth.
@@ -103,11 +112,10 @@ class SimulatedDetector:
         visible = truth.xyxy_visible[k]
         extent = np.maximum(visible[2:] - visible[:2], 1.0)
         finding, naming = self._moods[number](frame, self._objects[number].position)
-        if rng.random() >= self.find_probability(visibility, np.sqrt(extent.prod()), finding):
+        side = np.sqrt(extent.prod())
+        if rng.random() >= self.find_probability(visibility, side, finding):
             return None
-        low, high = c.score_range
-        response = _logistic((visibility - 0.45) / 0.13 + 0.5 * c.mood * finding)
-        score = _beta(rng, low + (high - low) * float(response), c.score_strength)
+        score = _beta(rng, float(self.mean_score(visibility, side, finding)), c.score_strength)
         shares = self._split(rng, self.classes.index(self._objects[number].label), visibility, naming)
         return self._box(rng, visible, truth.xyxy[k], visibility), score * shares
 
@@ -181,7 +189,14 @@ def _mean_shares(classes: tuple[str, ...], config: SimulatedDetectorConfig) -> n
             a, b = classes.index(first), classes.index(second)
             shares[a, b] = shares[b, a] = share
     np.fill_diagonal(shares, 0.0)
-    np.fill_diagonal(shares, 1.0 - shares.sum(axis=1))
+    left = 1.0 - shares.sum(axis=1)
+    if left.min() <= 0.0:
+        found = f"{1.0 - left.min():.2f} among {len(classes)} classes"
+        raise UserError(
+            f"detector simulated: expected wrong classes to share less than 1 of a score, found {found}; "
+            "lower stray_share or the confusions"
+        )
+    np.fill_diagonal(shares, left)
     return shares
 
 

@@ -4,6 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..datasets.errors import UserError
+
+LIMITS = {  # least and greatest; widths and strengths divide, or are parameters that have to be positive
+    "max_recall": (0.0, 1.0), "half_visibility": (0.0, 1.0), "visibility_width": (1e-3, 10.0),
+    "half_side": (1e-3, 1e4), "side_width": (1e-3, 100.0), "mood": (0.0, 10.0), "mood_rate": (1e-3, 100.0),
+    "score_visibility": (0.0, 1.0), "score_visibility_width": (1e-3, 10.0), "score_side": (1e-3, 1e4),
+    "score_side_width": (1e-3, 100.0), "score_strength": (1e-2, 1e6), "min_score": (0.0, 1.0),
+    "confusion_growth": (0.0, 1000.0), "stray_share": (0.0, 1.0), "split_strength": (1e-2, 1e6),
+    "box_sigma": (0.0, 1.0), "box_growth": (0.0, 100.0), "box_tail": (2.1, 1e6), "background_spots": (0, 1000),
+    "spot_chance": (0.0, 1.0), "spot_sharpness": (0.0, 1000.0), "chance_rate": (0.0, 100.0),
+}  # fmt: skip
+
 
 @dataclass(frozen=True, slots=True)
 class SimulatedDetectorConfig:
@@ -17,7 +29,11 @@ class SimulatedDetectorConfig:
         side_width: the logistic's width in octaves of it.
         mood: how much the viewing direction shifts the two logistics, in their own unit (standard deviation).
         mood_rate: radians of viewing direction over which that changes.
-        score_range: mean score of hardly and of fully visible objects.
+        score_range: mean score of objects hardly to be seen, and of large, fully visible ones.
+        score_visibility: visible share at which the score has risen half way, and
+        score_visibility_width: the logistic's width in visible share.
+        score_side: pixels, root of the visible box's area, the same by size, and
+        score_side_width: the logistic's width in octaves of it.
         score_strength: sum of the beta distribution's parameters; larger means less spread.
         min_score: detections whose best class scores less are not reported.
         confusions: pairs of classes and the mean share of the score the wrong one takes of a fully visible object.
@@ -26,7 +42,7 @@ class SimulatedDetectorConfig:
         split_strength: sum of the Dirichlet distribution's parameters.
         box_sigma: standard deviation of a box's side, as a share of the box's extent in that direction.
         box_growth: factor by which it has grown when nothing is visible.
-        box_tail: degrees of freedom of Student's t.
+        box_tail: degrees of freedom of Student's t, more than 2, without which it has no deviation.
         amodal: beta parameters of how far a side reaches from the visible part (0) to the whole object (1).
         background_spots: number of persistent false detections on surfaces; every thing of clutter is one more.
         spot_chance: chance of a detection of a spot from its best view.
@@ -35,6 +51,9 @@ class SimulatedDetectorConfig:
         chance_rate: false detections a frame that do not come again.
         chance_score: beta parameters of their score.
         chance_side: pixels, least and greatest side of their boxes.
+
+    Raises:
+        UserError: a number outside its limits.
     """
 
     max_recall: float = 0.96
@@ -45,6 +64,10 @@ class SimulatedDetectorConfig:
     mood: float = 0.8
     mood_rate: float = 0.35
     score_range: tuple[float, float] = (0.15, 0.84)
+    score_visibility: float = 0.45
+    score_visibility_width: float = 0.13
+    score_side: float = 20.0
+    score_side_width: float = 0.6
     score_strength: float = 22.0
     min_score: float = 0.05
     confusions: tuple[tuple[str, str, float], ...] = (
@@ -72,3 +95,8 @@ class SimulatedDetectorConfig:
     chance_rate: float = 0.12
     chance_score: tuple[float, float] = (1.6, 9.0)
     chance_side: tuple[float, float] = (16.0, 130.0)
+
+    def __post_init__(self) -> None:
+        for name, (low, high) in LIMITS.items():
+            if not low <= (value := getattr(self, name)) <= high:
+                raise UserError(f"detector simulated: expected {name} from {low} to {high}, found {value}; change it")

@@ -45,7 +45,7 @@ class SyntheticConfig:
         frames: length of the sequence; None for the preset's. A longer one begins with the same frames.
         width: pixels, divisible by 4; images are 4:3 with the field of view of f = 525 at 640 x 480.
         meshes: folder of textured OBJ or GLB scans that take part as objects, or None.
-        blur: renderings averaged over the exposure for motion blur; 0 or 1 for none.
+        blur: renderings averaged over the exposure for motion blur; 0 or 1 for none. The survey's camera stands still.
         sensor: the depth sensor.
         camera: the colour camera.
 
@@ -69,6 +69,8 @@ class SyntheticConfig:
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
                 raise UserError(f"synth:{self.preset}: expected {name} from {low} to {high}, found {value}; change it")
+        if self.preset is Preset.SURVEY and self.blur > 1:
+            raise UserError(f"synth:{self.preset}: its camera stands still, found blur {self.blur}; leave it out")
         if self.width % 4:
             raise UserError(f"synth:{self.preset}: expected a width divisible by 4, found {self.width}; change it")
 

@@ -29,7 +29,7 @@ class TabletopConfig:
         seed: of the scene, the path and the noise.
         objects: number of things of the sample's classes on the table; clutter comes on top.
         frames: length of the sequence; a longer one begins with the same frames.
-        width: pixels, even; images are 4:3 with the field of view of f = 525 at 640 x 480.
+        width: pixels, divisible by 4; images are 4:3 with the field of view of f = 525 at 640 x 480.
         orbit: how the camera moves.
         sensor: the depth sensor.
         camera: the colour camera; its white balance holds still.

@@ -52,7 +52,8 @@ def build_scene(config: SyntheticConfig) -> Scene:
     Raises:
         UserError: no room for so many things, or meshes that cannot be used (see `load_scans`).
     """
-    return _build(config.preset, config.object_count, config.clutter, config.seed, config.meshes)
+    meshes = None if config.meshes is None else config.meshes.resolve()  # the same path elsewhere is another folder
+    return _build(config.preset, config.object_count, config.clutter, config.seed, meshes)
 
 
 @lru_cache(maxsize=2)  # it takes seconds, and a sequence is often opened again

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, unquote
 
 from ..errors import UserError
+from ..paths import user_path
 from .config import DEFAULT_FRAMES, DEFAULT_OBJECTS, ClutterLevel, Preset, SyntheticConfig
 from .rendering.sensor import IDEAL, SWITCHES, DepthSensor
 
@@ -114,8 +115,8 @@ def _value(base: str, key: str, text: str) -> Any:
 
 def _folder(text: str) -> Path:
     """A path as it stands where there is such a folder, else with its percent codes decoded."""
-    plain = Path(text).expanduser()
-    return plain if plain.exists() else Path(unquote(text)).expanduser()
+    plain = user_path(text)
+    return plain if plain.exists() else user_path(unquote(text))
 
 
 def _sensor_without(effects: tuple[str, ...]) -> DepthSensor:

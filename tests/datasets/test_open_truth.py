@@ -60,6 +60,17 @@ def test_a_line_and_its_files_tell_the_same(rendered: TabletopSequence, written:
         np.testing.assert_array_equal(truth.point_truth().object_id, rendered.point_truth().object_id)
 
 
+def test_the_file_of_a_truth_is_known_in_its_own_folder(written: Path, monkeypatch) -> None:
+    monkeypatch.chdir(written / "truth")
+    assert len(open_truth("truth.json").objects) == 3
+
+
+def test_homes_of_nobody_are_told() -> None:
+    for spec in ("~no such user/table", "synth:tabletop?meshes=~no such user/scans"):
+        with pytest.raises(InputError, match="without ~"):
+            open_truth(spec)
+
+
 def test_a_synthetic_line(tmp_path: Path) -> None:
     truth = open_truth("synth:tabletop?objects=2&frames=2&width=64&clutter=low")
     assert len(truth.objects) == 2 and truth.complete

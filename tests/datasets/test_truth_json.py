@@ -56,6 +56,8 @@ def test_a_missing_key_is_told(tmp_path: Path, key: str) -> None:
         ({"position": [1, 2, float("nan")]}, "three numbers"),
         ({"position": "here"}, "three numbers"),
         ({"position": [1, [2], 3]}, "three numbers"),
+        ({"position": [1, 10**400, 3]}, "too large"),
+        ({"tolerance": 10**400}, "too large"),
         ({"tolerance": 0}, "> 0"),
         ({"tolerance": "small"}, "a number"),
         ({"size": [0.1, 0.1, -0.1]}, "objects[0].size"),
@@ -80,6 +82,7 @@ def test_an_impossible_value_is_told(tmp_path: Path, change: dict, part: str) ->
         ('{"objects": [3]}', "an object at objects[0]"),
         ('{"objects": [], "known_false_detections": 3}', "known_false_detections"),
         ("{'objects': []}", "no JSON"),
+        ('{"objects": ' + "9" * 5000 + "}", "too many digits"),
     ],
 )
 def test_another_form_is_told(tmp_path: Path, text: str, part: str) -> None:

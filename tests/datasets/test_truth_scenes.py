@@ -170,6 +170,19 @@ def test_a_table_of_one_video_needs_no_name(tmp_path: Path) -> None:
         open_truth(tmp_path / "boxes.tsv")
 
 
+def test_poses_for_boxes_without_images_belong_to_the_frames_of_the_boxes(tmp_path: Path, pose, tum_row) -> None:
+    header = "no\tscene\tsubfolder\timage_id\tobject\tlabel\tbox\n"
+    (tmp_path / "boxes.tsv").write_text(header + "1\tdesk\tdesk_2\t3\tcap\tcap_4\t(11, 21, 30, 40)\n")
+    trajectory = tmp_path / "groundtruth.txt"
+    trajectory.write_text("".join(tum_row(k / 30, pose(k)) for k in range(9)))
+    truth = open_truth(tmp_path / "boxes.tsv", poses=trajectory)
+    assert truth.names == ("desk_2_1", "desk_2_2", "desk_2_3") and truth.poses is not None
+    np.testing.assert_allclose(truth.poses, [pose(k) for k in (1, 2, 3)], atol=1e-6)
+    trajectory.write_text("".join(tum_row(1e9 + k / 30, pose(k)) for k in range(9)))
+    with pytest.raises(InputError, match="same clock"):
+        open_truth(tmp_path / "boxes.tsv", poses=trajectory)
+
+
 def test_all_real_boxes(real_data: Path) -> None:
     table = real_data / "uw_scenes_v1" / "rgbd-scenes_boxes.tsv"
     with pytest.raises(InputError, match=r"table_small_1.*#VIDEO"):

@@ -72,6 +72,17 @@ def test_small_objects_are_missed_more_often():
     assert by_size[0] < 0.1 and by_size[2] == pytest.approx(0.48, abs=0.01) and by_size[-1] > 0.95
 
 
+def test_mean_scores_rise_with_size_and_visibility():
+    detector = SimulatedDetector(Lineup(1.0), QUIET)
+    by_size = detector.mean_score(1.0, np.array([4.0, 10.0, 20.0, 40.0, 200.0]))
+    by_visibility = detector.mean_score(np.linspace(0.0, 1.0, 11), 80.0)
+    assert np.all(np.diff(by_size) > 0) and np.all(np.diff(by_visibility) > 0)
+    low, high = QUIET.score_range
+    half = low + (high - low) / 2.0
+    assert by_size[2] == pytest.approx(half, abs=0.01) and by_size[-1] == pytest.approx(high, abs=0.02)
+    assert detector.mean_score(QUIET.score_visibility, 1e6) == pytest.approx(half)
+
+
 def test_scores_are_a_full_vector_that_falls_with_occlusion():
     found = run(SimulatedDetector(Lineup(1.0, 0.45), QUIET))
     scores = np.concatenate([d.scores for d in found])
@@ -81,6 +92,26 @@ def test_scores_are_a_full_vector_that_falls_with_occlusion():
     unsure = np.concatenate([d.confidence[near_column(d, 90)] for d in found])
     assert sure.mean() > 0.5 and sure.mean() - unsure.mean() > 0.2
     assert 0.05 < sure.std() < 0.3, "scores vary"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"max_recall": 1.5}, {"visibility_width": 0.0}, {"half_side": 0.0}, {"mood_rate": 0.0},
+        {"score_strength": -1.0}, {"min_score": 2.0}, {"split_strength": 0.0}, {"box_sigma": float("inf")},
+        {"box_tail": 2.0}, {"background_spots": -3}, {"spot_chance": float("nan")}, {"chance_rate": -1.0},
+    ],
+)  # fmt: skip
+def test_impossible_numbers_are_told(change: dict[str, float]):
+    with pytest.raises(UserError, match=f"expected {next(iter(change))} from"):
+        SimulatedDetectorConfig(**change)
+
+
+def test_shares_that_leave_nothing_and_negative_seeds_are_told():
+    with pytest.raises(UserError, match="lower stray_share"):
+        SimulatedDetector(Lineup(1.0), SimulatedDetectorConfig(stray_share=0.5))
+    with pytest.raises(UserError, match="a seed >= 0, found -1"):
+        SimulatedDetector(Lineup(1.0), seed=-1)
 
 
 def test_confusions_happen_between_the_stated_pairs_and_grow_with_occlusion():

@@ -36,11 +36,11 @@ def read_config(folder: Path) -> SyntheticConfig | TabletopConfig:
     path = TruthPaths(folder / FOLDER).record
     values = dict(read_record(path).configuration)
     kind = values.pop(KIND, None)
-    if kind not in KINDS:
+    if not isinstance(kind, str) or kind not in KINDS:
         raise InputError(path, f"configuration.{KIND} among {', '.join(KINDS)}", repr(kind), REMEDY)
     try:
         return _built(KINDS[kind], values)
-    except (TypeError, ValueError, KeyError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(path, f"a {kind} at configuration", str(error), REMEDY) from None
 
 
@@ -66,6 +66,8 @@ def _built(kind: Any, value: Any) -> Any:
         options = [option for option in typing.get_args(kind) if option is not NoneType]
         return None if value is None else _built(options[0], value)
     if is_dataclass(kind):
+        if not isinstance(value, dict):
+            raise ValueError(f"{value!r} where values by name belong")
         hints = typing.get_type_hints(kind)
         if strange := set(value) - set(hints):
             raise ValueError(f"unknown values {', '.join(sorted(strange))}")

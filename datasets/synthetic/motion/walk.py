@@ -87,7 +87,7 @@ class Loop:
         knots = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(rows[:, :2], axis=0), axis=1))]
         spline = CubicSpline(knots, rows, bc_type="periodic")
         # The spline's own parameter runs a little slower than its length: measure it once, finely.
-        fine = np.linspace(0.0, knots[-1], 20 * len(knots) * 10)
+        fine = np.linspace(0.0, knots[-1], 200 * len(knots))
         length = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(spline(fine)[:, :2], axis=0), axis=1))]
         self.length = float(length[-1])
         self._spline, self._fine, self._length = spline, fine, length

@@ -52,7 +52,7 @@ class Layout:
 
     Attributes:
         parts: all surfaces.
-        supports: places for things; those first in the list are filled first.
+        supports: places for things; how many each gets is decided in `placement`, of equal ones the first comes first.
         lights: of all rooms.
     """
 

@@ -67,7 +67,7 @@ def _choose(rng: np.random.Generator, choices: Sequence[T]) -> T:
 
 
 def _kitchen(rng: np.random.Generator) -> list[Piece]:
-    """Those on which things stand come first, the fullest first."""
+    """Those on which things stand come first."""
     fronts: Colour = _choose(rng, ((226, 224, 214), (150, 170, 152), (96, 116, 140), (206, 190, 160)))
     finish = KitchenFinish(
         fronts=textures.plain(rng, fronts, 0.03, 128),
@@ -118,7 +118,7 @@ def _hood(finish: KitchenFinish, x: float) -> Part:
 
 
 def _living_room(rng: np.random.Generator) -> list[Piece]:
-    """Those on which things stand come first, the fullest first."""
+    """Those on which things stand come first."""
     wood = textures.wood(rng, *_choose(rng, (WALNUT, OAK)))
     top = textures.wood(rng, *_choose(rng, (WALNUT, OAK)), 1024, planks=4)
     iron = textures.plain(rng, (52, 52, 56), 0.04)

@@ -45,17 +45,18 @@ def decoded(data: bytes, path: Path, name: str) -> np.ndarray:
 def named_textures(path: Path) -> dict[str, Path]:
     """Material name to texture file, as the material files of an OBJ tell."""
     named: dict[str, Path] = {}
-    for library in _values(path, "mtllib"):
+    libraries = [value for key, value in map(_statement, _lines(path)) if key == "mtllib"]
+    for library in libraries:
         file, material = path.parent / library, ""
         if not file.is_file():
             raise InputError(path, f"its material file {library} beside it", "none", "copy it there")
         for line in _lines(file):
-            key, _, value = line.strip().partition(" ")
-            if key.lower() == "newmtl":
-                material = value.strip()
-            elif key.lower() == "map_kd":
+            key, value = _statement(line)
+            if key == "newmtl":
+                material = value
+            elif key == "map_kd":
                 words = value.split()
-                texture = file.parent / (words[-1] if words and words[0].startswith("-") else value.strip())
+                texture = file.parent / (words[-1] if words and words[0].startswith("-") else value)
                 if not texture.is_file():
                     raise InputError(file, f"the texture {texture.name} beside it", "none", "copy it there")
                 named[material] = texture
@@ -66,8 +67,10 @@ def _lines(file: Path) -> list[str]:
     return file.read_text(encoding="utf-8", errors="replace").splitlines()
 
 
-def _values(path: Path, key: str) -> list[str]:
-    return [line.partition(" ")[2].strip() for line in _lines(path) if line.startswith(key + " ")]
+def _statement(line: str) -> tuple[str, str]:
+    """Keyword, in lower case, and the rest of the line; blanks or tabs part them."""
+    key, *rest = line.split(None, 1) or [""]
+    return key.lower(), rest[0].strip() if rest else ""
 
 
 def check_images(path: Path) -> None:

@@ -142,6 +142,9 @@ def test_configurations_come_back_exactly(copy: Path, config) -> None:
         ({"sensor": {"warp": 1}}, "unknown values warp"),
         ({"sensor": {"grazing_cosines": [1.0]}}, "a TabletopConfig at configuration"),
         ({"sensor": 3}, "a TabletopConfig at configuration"),
+        ({"sensor": []}, "[] where values by name belong"),
+        ({"kind": []}, "found []"),
+        ({"camera": {"gain": 10**400}}, "too large"),
         ({"objects": 500}, "expected objects from 1"),
     ],
 )

@@ -118,6 +118,14 @@ def test_textures_get_sides_that_are_powers_of_two(tmp_path):
     assert shapes == [(1024, 1024, 3), (128, 64, 3)]
 
 
+def test_tabs_part_the_words_of_material_files(tmp_path):
+    file = write_obj(tmp_path / "cup.obj")
+    file.write_text(file.read_text().replace("mtllib ", "mtllib\t"))
+    file.with_suffix(".mtl").write_text("newmtl\tskin\n\tKd\t0.1 0.1 0.1\n\tmap_Kd\tcup.png\n")
+    (model,) = load_scans(tmp_path)
+    assert model.parts[0].texture.shape == (32, 32, 3) and model.parts[0].texture[0, 0].tolist() == list(RED)
+
+
 def test_a_gltf_factor_darkens_its_texture(tmp_path):
     write_glb(tmp_path / "plain.glb")
     write_glb(tmp_path / "tinted.glb", factor=(0.25, 1.0, 1.0, 1.0))
