@@ -1,6 +1,6 @@
 """The frozen suite: rendered scenes, the mapper with and without its parts, judged by `thingmap evaluate`'s protocols.
 
-uv run python benchmarks/run.py --write                     all of it: about an hour on two cores, 3 GB of scenes
+uv run python benchmarks/run.py --write                     all of it: about 40 minutes on two cores, 4.5 GB of scenes
 uv run python benchmarks/run.py --quick                     one short scene of each preset and clutter level
 uv run python benchmarks/run.py --presets survey            one preset
 """
