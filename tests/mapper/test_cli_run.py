@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from thingmap.datasets.errors import UserError
-from thingmap.datasets.open import SAMPLE_PREFIX, Loader
+from thingmap.datasets.open import SAMPLE_PREFIX, SYNTH_PREFIX, Loader
 from thingmap.detectors.detections import Detections
 from thingmap.mapper.cli.main import app
 from thingmap.mapper.config import MapperConfig, OdometrySource
@@ -56,6 +56,7 @@ def world(monkeypatch, tiny_sequence, fake_mapper):
             "open_sequence": world.open_sequence,
             "LOADERS": (Loader("folder", "images in a folder", lambda path: [path], world.open_sequence),),
             "SAMPLE_PREFIX": SAMPLE_PREFIX,
+            "SYNTH_PREFIX": SYNTH_PREFIX,
         },
         "thingmap.detectors.spec": {"make_detector": world.make_detector},
         "thingmap.mapper.mapper": {"SemanticMapper": world.make_mapper},

@@ -50,6 +50,8 @@ def test_only_what_differs_from_the_defaults_is_written():
     off=st.sets(st.sampled_from(SWITCHES)),
 )
 def test_a_line_asks_for_what_it_was_made_of(preset, clutter, numbers, meshes, off):
+    if preset is Preset.SURVEY:
+        numbers.pop("blur", None)  # its camera stands still
     sensor = replace(DepthSensor(), **dict.fromkeys(off, False))
     folder = None if meshes is None else Path("/no such place") / meshes
     config = SyntheticConfig(preset, clutter=clutter, sensor=sensor, meshes=folder, **numbers)
