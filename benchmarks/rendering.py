@@ -16,7 +16,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from results import machine, table, write_section
+from results import show_section, table
 
 from thingmap.datasets.errors import UserError
 from thingmap.datasets.synthetic.config import ClutterLevel, Preset, SyntheticConfig
@@ -66,10 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     indices = [int(k) for k in np.linspace(0, len(sequence) - 1, options.frames)]
     paces = measure_paces(sequence, indices, options.threads, building)
-    body = f"{describe(sequence, paces, len(indices))}\n\n{machine()}"
-    print(f"\n## {TITLE}\n\n{body}")
-    if options.write:
-        write_section(TITLE, body)
+    show_section(TITLE, describe(sequence, paces, len(indices)), options.write)
     return 0
 
 

@@ -35,3 +35,11 @@ def write_section(title: str, body: str, path: Path = RESULTS) -> None:
     kept = {section.split("\n", 1)[0]: section.rstrip() for section in sections}
     kept[title] = f"{title}\n\n{body.strip()}"
     path.write_text("\n## ".join([head.rstrip() + "\n", *(section + "\n" for section in kept.values())]), "utf-8")
+
+
+def show_section(title: str, text: str, write: bool) -> None:
+    """Print a section with the machine's line below it; with `write`, put it into RESULTS.md too."""
+    body = f"{text}\n\n{machine()}"
+    print(f"\n## {title}\n\n{body}", flush=True)
+    if write:
+        write_section(title, body)

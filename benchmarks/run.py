@@ -18,9 +18,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from results import machine, write_section
-from suite import VARIANTS, Scene, Variant, scenes
-from suite_job import judge, read_judgement, render
+from results import show_section
+from suite import VARIANTS, WHOLE, Scene, Variant, scenes
+from suite_job import is_rendered, judge, read_judgement, render
 from suite_report import COST_COLUMNS, IMAGE_COLUMNS, OBJECT_COLUMNS, Row, honesty_table, metric_table, next_view_table
 
 from thingmap.datasets.errors import UserError
@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with tempfile.TemporaryDirectory() as temporary:
         folder = options.folder or Path(temporary)
         try:
-            _all("rendered", render, [(scene, folder) for scene in suite], 1)  # it takes both cores by itself
+            _all("rendered", render, [(scene, folder) for scene in suite if not is_rendered(scene, folder)], 1)
             _all("judged", judge, [(scene, variant, folder) for scene, variant in jobs], options.jobs)
         except UserError as error:
             print(f"error: {error}", file=sys.stderr)
@@ -68,10 +68,10 @@ def _call(work: Callable[..., None], call: tuple[Any, ...]) -> tuple[Any, ...]:
 def _show(
     variants: list[Variant], jobs: list[tuple[Scene, Variant]], folder: Path, options: argparse.Namespace
 ) -> None:
-    whole = [scene for scene, variant in jobs if variant.name == "full"]
+    whole = [scene for scene, variant in jobs if variant == WHOLE]
     head = f"{len({scene for scene, _ in jobs})} scenes, evaluator {VERSION}; means over a row's scenes."
     if whole:
-        rows = list(_by_preset(whole, "full", folder))
+        rows = list(_by_preset(whole, folder))
         survey = [row for row in rows if row[0][0] == Preset.SURVEY]
         cost = "\n\n".join([metric_table(GROUPED, COST_COLUMNS, rows), _cost_note(options.jobs)])
         sections = {
@@ -83,18 +83,17 @@ def _show(
         }
         for title, text in sections.items():
             if text:
-                _section(f"Suite: {title}", f"{head}\n\n{text}", options.write)
+                show_section(f"Suite: {title}", f"{head}\n\n{text}", options.write)
     if len(variants) > 1:
-        _section("Suite: ablations", f"{head}\n\n{_ablations(variants, jobs, folder)}", options.write)
+        show_section("Suite: ablations", f"{head}\n\n{_ablations(variants, jobs, folder)}", options.write)
 
 
-def _by_preset(some: Iterable[Scene], variant: str, folder: Path) -> Iterable[Row]:
-    some = list(some)
-    (chosen,) = (v for v in VARIANTS if v.name == variant)
+def _by_preset(whole: list[Scene], folder: Path) -> Iterable[Row]:
+    """What the whole mapper made of the scenes of each preset and clutter level."""
     for preset, clutter in itertools.product(Preset, ClutterLevel):
-        group = [scene for scene in some if (scene.preset, scene.clutter) == (preset, clutter)]
+        group = [scene for scene in whole if (scene.preset, scene.clutter) == (preset, clutter)]
         if group:
-            yield (preset.value, clutter.value), [read_judgement(scene, chosen, folder) for scene in group]
+            yield (preset.value, clutter.value), [read_judgement(scene, WHOLE, folder) for scene in group]
 
 
 def _ablations(variants: list[Variant], jobs: list[tuple[Scene, Variant]], folder: Path) -> str:
@@ -112,13 +111,6 @@ def _ablations(variants: list[Variant], jobs: list[tuple[Scene, Variant]], folde
 
 def _cost_note(jobs: int) -> str:
     return f"Reading from disk, recorded frames, simulated detections; {jobs} scenes mapped at a time on this machine."
-
-
-def _section(title: str, text: str, write: bool) -> None:
-    body = f"{text}\n\n{machine()}"
-    print(f"\n## {title}\n\n{body}", flush=True)
-    if write:
-        write_section(title, body)
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:

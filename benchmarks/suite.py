@@ -61,8 +61,9 @@ class Variant:
         return replace(whole, **{self.section: replace(getattr(whole, self.section), **{self.key: self.value})})
 
 
+WHOLE = Variant("full", "whole", presets=tuple(Preset))
 VARIANTS = (
-    Variant("full", "whole", presets=tuple(Preset)),
+    WHOLE,
     Variant("poses", "whole, poses given", "odometry", "source", OdometrySource.POSES, tuple(Preset)),
     Variant("no-occlusion", "without occlusion weighting", "evidence", "occlusion", False),
     Variant("no-misses", "without missed-detection evidence", "evidence", "misses", False),

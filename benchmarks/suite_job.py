@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numba
-from suite import SNAPSHOTS, Scene, Variant
+from suite import SNAPSHOTS, WHOLE, Scene, Variant
 
 from thingmap.datasets.open import open_sequence
 from thingmap.datasets.open_truth import open_truth
@@ -27,11 +27,19 @@ from thingmap.mapper.snapshots import SnapshotWriter
 DETECTOR = "simulated?seed=1"
 
 
+def is_rendered(scene: Scene, folder: Path) -> bool:
+    """Whether the scene is there already, whole: its poses are the last file but one that is written."""
+    return (scene_folder(scene, folder) / "poses.txt").is_file()
+
+
 def render(scene: Scene, folder: Path) -> None:
-    """Writes the scene's sequence with its truth; one that is there already, whole, is taken as it is."""
-    place = folder / "scenes" / scene.name
-    if not (place / "poses.txt").is_file():  # the last file but one that is written
-        write_sequence(SyntheticSequence(scene.config), place, overwrite=True)
+    """Writes the scene's sequence with its truth, on all cores."""
+    write_sequence(SyntheticSequence(scene.config), scene_folder(scene, folder), overwrite=True)
+
+
+def scene_folder(scene: Scene, folder: Path) -> Path:
+    """Where the scene's sequence is."""
+    return folder / "scenes" / scene.name
 
 
 def judge(scene: Scene, variant: Variant, folder: Path) -> None:
@@ -40,7 +48,7 @@ def judge(scene: Scene, variant: Variant, folder: Path) -> None:
     The whole mapper runs as the command does, doubtful things written too, since existence is judged by them.
     """
     numba.set_num_threads(1)
-    place = folder / "scenes" / scene.name
+    place = scene_folder(scene, folder)
     out = OutputFolder.create(folder / "maps" / variant.name / scene.name, overwrite=True)
     sequence = open_sequence(place)
     mapper = SemanticMapper(make_detector(DETECTOR, sequence), variant.config, source=sequence.name)
@@ -48,11 +56,11 @@ def judge(scene: Scene, variant: Variant, folder: Path) -> None:
     report = run.execute()
     command = {"sequence": scene.name, "detector": DETECTOR, "variant": variant.name}
     save_run(out, mapper, report, config=dump_config(variant.config), command=command, include_doubtful=True)
-    detector = DETECTOR if variant.name == "full" else "none"  # single views are the same for all
+    detector = DETECTOR if variant == WHOLE else "none"  # single views are the same for all
     truth = open_truth(place)
     judged = to_report(evaluate_run(out.path, truth, EvaluationConfig(), detector))
     page = None
-    if variant.name == "full":
+    if variant == WHOLE:
         pictures = take_pictures((case for result in judged.results for case in result.worst), truth.sequence)
         page = render_page(judged, pictures)
     write_report(judged, page, report_folder(scene, variant, folder))

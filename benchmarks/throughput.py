@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from back_end_report import describe_back_end, run_back_end
-from results import machine, write_section
+from results import show_section
 from whole_loop import describe_laps, describe_loop, record, run_laps, run_loop
 
 from thingmap.datasets.errors import UserError
@@ -29,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _measure_sequence(options)
         if options.keyframes:
             marks, quality = run_back_end(options.keyframes, options.objects, options.phantoms)
-            _show("Throughput: back end", describe_back_end(marks, quality, options.objects), options.write)
+            show_section("Throughput: back end", describe_back_end(marks, quality, options.objects), options.write)
     except UserError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
@@ -45,17 +45,10 @@ def _measure_sequence(options: argparse.Namespace) -> None:
             detector_ms = record(sequence, options.detector, recording)
             spec = f"recorded:{recording}"
         loop = run_loop(options.sequence, spec, options.max_frames)
-        _show("Throughput: whole loop", describe_loop(loop, detector_ms), options.write)
+        show_section("Throughput: whole loop", describe_loop(loop, detector_ms), options.write)
         if options.laps:
             samples = run_laps(options.sequence, spec, options.max_frames, options.laps)
-            _show("Throughput: memory", describe_laps(samples, options.laps), options.write)
-
-
-def _show(title: str, text: str, write: bool) -> None:
-    body = f"{text}\n\n{machine()}"
-    print(f"\n## {title}\n\n{body}", flush=True)
-    if write:
-        write_section(title, body)
+            show_section("Throughput: memory", describe_laps(samples, options.laps), options.write)
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
