@@ -277,8 +277,13 @@ class Smoother:
             case UpPrior():
                 self._values.insert(UP, gtsam.Unit3(record.direction))
             case Motion():
+                known = self._values.exists(X(record.a))
+                before = self._values.atPose3(X(record.a)) if known else self._isam.calculateEstimatePose3(X(record.a))
+                self._values.insert(X(record.b), before.compose(pose3(record.T_a_b)))
                 self.keyframes = record.b + 1
             case NewLandmark():
+                self._values.insertPoint3(L(record.landmark), record.position)
+                self._values.insert(S(record.landmark), record.log_size)
                 self._measurements[record.landmark] = []
         self.add(record)
 

@@ -9,6 +9,7 @@ import pytest
 
 from thingmap.mapper.config import MapperConfig
 from thingmap.mapper.estimation.outcomes import Outcome
+from thingmap.mapper.estimation.smoother import Smoother
 
 DEFAULT = MapperConfig()
 CUP = (0.6, 0.1, 0.02)
@@ -98,3 +99,16 @@ def test_without_the_joint_graph_objects_are_still_found_and_survive_a_rebuild(t
     room.smoother._rebuild()
     for j in room.objects:
         np.testing.assert_allclose(room.smoother.position(j), before[j], atol=0.01)  # a rebuild goes on to convergence
+
+
+def test_without_the_joint_graph_a_ledger_still_makes_the_graph_again(tools):
+    room = tools.Room(replace(tools.exact, joint=False))
+    for keyframe, place in enumerate([(2.0, 0.0, 0.3), (1.8, 0.7, 0.3), (1.5, 1.3, 0.3)]):
+        room.add_camera(tools.look_at(place))
+        if keyframe == 0:
+            room.add_object(1, (0.0, 0.0, 0.0), (0.1, 0.15, 0.2))
+        room.see(keyframe, 1)
+    room.smoother.update()
+    again = Smoother.from_ledger(room.smoother.ledger, replace(tools.exact, joint=False), tools.kinect)
+    np.testing.assert_allclose(again.position(1), room.smoother.position(1), atol=0.01)
+    np.testing.assert_allclose(again.poses(), room.smoother.poses(), atol=1e-6)
