@@ -142,6 +142,9 @@ class EvidenceModels:
 
     occlusion: bool = True  # off: as if nothing were ever hidden, nor seen through (Meger et al., Clutter, VI-C)
     misses: bool = True  # off: what should have been seen and was not says nothing
+    depth: bool = True  # off: depth at an object's place says nothing for or against it
+    parts: bool = True  # off: detections of object parts are not used
+    model: str = ""  # path of an evidence model that `thingmap learn` wrote; "generic" for none; empty: the shipped one
     appearance: AppearanceModel = field(default_factory=AppearanceModel)
     rate: DetectionRate = field(default_factory=DetectionRate)
     free_space: FreeSpace = field(default_factory=FreeSpace)
@@ -177,6 +180,16 @@ class LifecycleConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class BatchConfig:
+    """Inference over a fixed set of views, as both papers of Meger et al. do it (`run --inference batch`)."""
+
+    samples: int = 300  # volumes drawn from detections, by score (Explicit Occlusion, section 3)
+    max_iterations: int = 10  # association and optimisation, alternating; about 4 are needed (Clutter, V)
+    sliding_spacing: float = 0.5  # of a class's mean size, between neighbouring sliding volumes (Clutter, V)
+    overlap: float = 0.25  # intersection over union in space above which the less likely of two volumes is suppressed
+
+
+@dataclass(frozen=True, slots=True)
 class CloudConfig:
     """The coloured cloud that is written beside the map."""
 
@@ -202,4 +215,5 @@ class MapperConfig:
     evidence: EvidenceModels = field(default_factory=EvidenceModels)
     smoother: SmootherConfig = field(default_factory=SmootherConfig)
     lifecycle: LifecycleConfig = field(default_factory=LifecycleConfig)
+    batch: BatchConfig = field(default_factory=BatchConfig)
     cloud: CloudConfig = field(default_factory=CloudConfig)
