@@ -1,0 +1,1 @@
+"""What a detector does when objects are hidden, learned from sequences whose objects are known."""
