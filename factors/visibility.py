@@ -13,26 +13,24 @@ is never taken for an occluder; with the ellipsoid at both ends, 11 % of the pix
 free were (up to 75 %), and the free pixels of an empty place were the same to 1 %.
 
 Ratios are taken over pixels with a reading, for the whole silhouette and its halves by the centre of its box, the five
-templates of Explicit Occlusion, section 2.3.
+templates of Explicit Occlusion, section 2.3. What the depths of agreeing and free pixels say for an object is the
+business of `depth_likelihood.py`; both are measured in one pass over the pixels (`visibility_kernel.py`).
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from numba import njit
 
 from ..datasets.frame import Intrinsics
-from .outline import outline_area, row_span
-from .volume import camera_quadric, project_kernel
+from .depth_likelihood import DepthLikelihood
+from .visibility_kernel import AGREEING, FREE, LOG_RATIO, MISSING, NO_LIKELIHOOD, OCCLUDED, tally_volumes
 
 TOLERANCE_M = 0.01  # of pose and size
 TOLERANCE_PER_M = 0.003  # times z^2: noise of a structured-light camera (3 sigma is 0.006 z^2), edges blurred by it
-SMALL_PX = 16  # a silhouette narrower than this is sampled at every pixel
-_OCCLUDED, _AGREEING, _FREE, _MISSING = range(4)
+_LIKELIHOOD = DepthLikelihood()
 
 
 class VolumePart(IntEnum):
@@ -56,6 +54,11 @@ class Visibility:
         missing: (N, 5) share of the part's pixels in the image that have no reading; 1 means that nothing is known.
         in_image: (N, 5) share of the part's silhouette that lies inside the image.
         pixels: (N,) pixels of the whole silhouette inside the image, at full resolution.
+        depth_log_ratio: (N, 5) what the depths of the agreeing and free pixels say for "the object is there" against
+            "there is none", nats per pixel (`DepthLikelihood`); 0 without such pixels or without a likelihood. It is
+            the mean over the part and not the sum: pixels of one silhouette share the misfit of one volume, so n of
+            them are worth hardly more than one.
+        readings: (N, 5) number of agreeing and free pixels, at full resolution.
     """
 
     occluded: np.ndarray
@@ -64,6 +67,14 @@ class Visibility:
     missing: np.ndarray
     in_image: np.ndarray
     pixels: np.ndarray
+    depth_log_ratio: np.ndarray = None  # type: ignore[assignment]
+    readings: np.ndarray = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        """Without depth likelihoods, nothing is said by any pixel."""
+        for name in ("depth_log_ratio", "readings"):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, np.zeros(np.shape(self.free)))
 
     @property
     def visible(self) -> np.ndarray:
@@ -81,6 +92,7 @@ def measure_visibility(
     step: int = 2,
     tolerance_m: float = TOLERANCE_M,
     tolerance_per_m: float = TOLERANCE_PER_M,
+    likelihood: DepthLikelihood | None = _LIKELIHOOD,
 ) -> Visibility:
     """Compare N upright volumes with one depth image.
 
@@ -93,6 +105,7 @@ def measure_visibility(
         log_half_axes: (N, 3) log of metres.
         step: every step-th row and column is looked at.
         tolerance_m, tolerance_per_m: a depth z may differ by tolerance_m + tolerance_per_m * z^2.
+        likelihood: of the depth readings, the default one if not given; None leaves `depth_log_ratio` at zero.
 
     Raises:
         ValueError: where the depth image is not of the intrinsics' size.
@@ -100,95 +113,33 @@ def measure_visibility(
     if depth.shape != (intrinsics.height, intrinsics.width):
         raise ValueError(f"depth must be {intrinsics.height} x {intrinsics.width}, but got {depth.shape}")
     N = len(centers)
-    counts, in_image, pixels = np.zeros((N, 5, 4)), np.zeros((N, 5)), np.zeros(N)
-    _measure_all(
+    tallies, in_image, pixels = np.zeros((N, 5, 5)), np.zeros((N, 5)), np.zeros(N)
+    tally_volumes(
         np.ascontiguousarray(depth, dtype=np.float32),
         np.array([intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy]),
         np.asfortranarray(T_world_camera, dtype=float),
         np.ascontiguousarray(R_world_upright, dtype=float),
         np.ascontiguousarray(centers, dtype=float).reshape(-1, 3),
         np.ascontiguousarray(log_half_axes, dtype=float).reshape(-1, 3),
-        (step, float(tolerance_m), float(tolerance_per_m)),
-        counts,
+        int(step),
+        (float(tolerance_m), float(tolerance_per_m)),
+        NO_LIKELIHOOD if likelihood is None else likelihood.numbers,
+        tallies,
         in_image,
         pixels,
     )
-    readings = counts[:, :, :_MISSING].sum(axis=2)
-    ratios = counts[:, :, :_MISSING] / np.maximum(readings, 1.0)[:, :, None]
-    unread = counts[:, :, _MISSING]
+    seen = tallies[:, :, AGREEING] + tallies[:, :, FREE]
+    read, unread = seen + tallies[:, :, OCCLUDED], tallies[:, :, MISSING]
+    ratios = tallies / np.maximum(read, 1.0)[:, :, None]
     # A part that falls between the pixels has none: nothing is known of it either.
-    missing = np.where(readings + unread > 0.0, unread / np.maximum(readings + unread, 1.0), in_image > 0.0)
-    return Visibility(ratios[:, :, _OCCLUDED], ratios[:, :, _AGREEING], ratios[:, :, _FREE], missing, in_image, pixels)
-
-
-@njit(cache=True)
-def _measure_all(depth, camera, T, R, centers, log_half_axes, sampling, counts, in_image, pixels):
-    xyxy, unused = np.empty(4), np.zeros((4, 12))
-    for n in range(len(centers)):
-        if project_kernel(T, R, centers[n], log_half_axes[n], xyxy, unused, False):
-            for side in range(4):
-                xyxy[side] = camera[side % 2] * xyxy[side] + camera[2 + side % 2]
-            pixels[n] = _measure(
-                depth, camera, T, R, centers[n], log_half_axes[n], sampling, xyxy, counts[n], in_image[n]
-            )
-
-
-@njit(cache=True)
-def _measure(depth, camera, T, R, center, log_half_axes, sampling, xyxy, counts, in_image):
-    """Fill counts (5, 4) and in_image (5,) of one volume with the box xyxy; return its pixels in the image.
-
-    Row by row: where the silhouette begins and ends is the root of a quadratic, so only its own pixels are visited.
-    """
-    height, width = depth.shape
-    fx, fy, cx, cy = camera
-    A, M, t = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
-    camera_quadric(T, R, center, log_half_axes, A, M, t)
-    to_ball = (A / np.exp(log_half_axes)).T.copy()  # to where the ellipsoid is the unit ball
-    origin, column, row = -(to_ball @ t), to_ball[:, 0].copy(), np.empty(3)  # of the camera and its rays, there
-    step = sampling[0] if min(xyxy[2] - xyxy[0], xyxy[3] - xyxy[1]) >= SMALL_PX else 1
-    u_mid, v_mid = (xyxy[0] + xyxy[2]) / 2.0, (xyxy[1] + xyxy[3]) / 2.0
-    first, last = max(math.ceil(xyxy[1]), 0), min(math.floor(xyxy[3]), height - 1)
-    area, area_left, area_top, pixels = 0.0, 0.0, 0.0, 0
-    for v in range(first, last + 1):
-        for i in range(3):
-            row[i] = to_ball[i, 1] * (v - cy) / fy + to_ball[i, 2]
-        lo, hi = row_span(column, row, origin)
-        lo, hi = max(fx * lo + cx, -0.5), min(fx * hi + cx, width - 0.5)
-        if not lo < hi:
-            continue
-        area += hi - lo
-        area_left += max(min(hi, u_mid) - lo, 0.0)
-        area_top += (hi - lo) * min(max(v_mid - v + 0.5, 0.0), 1.0)
-        u_first, u_last = math.ceil(lo), min(math.floor(hi), width - 1)
-        pixels += max(u_last + 1 - u_first, 0)
-        if (v - first) % step == 0:
-            for u in range(u_first, u_last + 1, step):
-                outcome = _outcome(depth[v, u], (u - cx) / fx, column, row, origin, sampling)
-                counts[0, outcome] += 1.0
-                counts[1 if v < v_mid else 2, outcome] += 1.0
-                counts[3 if u < u_mid else 4, outcome] += 1.0
-    if xyxy[0] >= -0.5 and xyxy[1] >= -0.5 and xyxy[2] <= width - 0.5 and xyxy[3] <= height - 0.5:
-        in_image[:] = 1.0
-    else:
-        full = fx * fy * outline_area(M, t)  # of which every half has half
-        inside = (area, 2.0 * area_top, 2.0 * (area - area_top), 2.0 * area_left, 2.0 * (area - area_left))
-        for part in range(5):
-            in_image[part] = min(inside[part] / full, 1.0)
-    return pixels
-
-
-@njit(cache=True, error_model="numpy")
-def _outcome(z, x, column, row, origin, sampling):
-    """Outcome of one pixel; with rays of unit depth, the parameter along the ray is depth."""
-    if not 0.0 < z < np.inf:
-        return _MISSING
-    tolerance = sampling[1] + sampling[2] * z * z
-    entry, qq, qo, oo = -np.inf, 0.0, 0.0, 0.0
-    for i in range(3):
-        q, o = x * column[i] + row[i], origin[i]
-        entry = max(entry, -(o + math.copysign(1.0, q)) / q)
-        qq, qo, oo = qq + q * q, qo + q * o, oo + o * o
-    if z < entry - tolerance:
-        return _OCCLUDED
-    leaves = (math.sqrt(max(qo * qo - qq * (oo - 1.0), 0.0)) - qo) / qq
-    return _FREE if z > leaves + tolerance else _AGREEING
+    missing = np.where(read + unread > 0.0, unread / np.maximum(read + unread, 1.0), in_image > 0.0)
+    return Visibility(
+        occluded=ratios[:, :, OCCLUDED],
+        agreeing=ratios[:, :, AGREEING],
+        free=ratios[:, :, FREE],
+        missing=missing,
+        in_image=in_image,
+        pixels=pixels,
+        depth_log_ratio=tallies[:, :, LOG_RATIO] / np.maximum(seen, 1.0),
+        readings=seen,
+    )

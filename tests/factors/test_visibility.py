@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from thingmap.datasets.frame import Intrinsics
 from thingmap.detectors.detections import Part
+from thingmap.factors.depth_likelihood import DepthLikelihood
 from thingmap.factors.visibility import Visibility, VolumePart, measure_visibility
 from thingmap.factors.volume import project_volumes
 
@@ -194,7 +195,8 @@ def test_every_pixel_of_turned_volumes_against_plain_geometry(seed):
     R_upright, R_camera = Rotation.random(2, rng).as_matrix()
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = R_camera, rng.normal(size=3)
-    center = R_camera @ [rng.uniform(-0.5, 0.5), rng.uniform(-0.4, 0.4), rng.uniform(1.3, 2.5)] + T[:3, 3]
+    in_camera = np.array([rng.uniform(-0.5, 0.5), rng.uniform(-0.4, 0.4), rng.uniform(1.3, 2.5)])
+    center = R_camera @ in_camera + T[:3, 3]
     half_axes = rng.uniform(0.05, 0.4, 3)
     depth = rng.uniform(0.8, 3.0, (240, 320)).astype(np.float32)
     depth[rng.random(depth.shape) < 0.1] = 0.0
@@ -213,11 +215,79 @@ def test_every_pixel_of_turned_volumes_against_plain_geometry(seed):
     occluded, free = z < entry - tolerance, z > leaves + tolerance
     expected = [occluded[read].mean(), (~occluded & ~free)[read].mean(), free[read].mean(), 1 - read.sum() / hit.sum()]
 
-    size = np.log(half_axes)[None]
-    seen = measure_visibility(depth, INTRINSICS, T, R_upright, center[None], size, 1, 0.01, 0.003)
+    size, likelihood = np.log(half_axes)[None], DepthLikelihood(surface=0.6, sensor_noise=0.01, outlier=0.1)
+    seen = measure_visibility(depth, INTRINSICS, T, R_upright, center[None], size, 1, 0.01, 0.003, likelihood)
     found = [seen.occluded[0, WHOLE], seen.agreeing[0, WHOLE], seen.free[0, WHOLE], seen.missing[0, WHOLE]]
     assert seen.pixels[0] == pytest.approx(hit.sum(), abs=1)
     np.testing.assert_allclose(found, expected, atol=2.0 / hit.sum())
+
+    through_center = R_upright.T @ R_camera @ (in_camera / in_camera[2])
+    half_depth = 1.0 / np.linalg.norm(through_center / half_axes)
+    told = read & ~occluded
+    at_center = 0.01 + 0.003 * in_camera[2] ** 2
+    nats = likelihood.log_ratio((z - entry)[told], half_depth, in_camera[2], at_center)
+    assert seen.readings[0, WHOLE] == pytest.approx(told.sum(), abs=2)
+    assert seen.depth_log_ratio[0, WHOLE] == pytest.approx(nats.mean(), abs=10.0 / told.sum())
+    box, _ = project_volumes(T, R_upright, center[None], size, INTRINSICS)
+    u, v = np.meshgrid(np.arange(320), np.arange(240))
+    left, top = u.ravel()[told] < box[0, [0, 2]].mean(), v.ravel()[told] < box[0, [1, 3]].mean()
+    for part, half in zip((TOP, BOTTOM, LEFT, RIGHT), (top, ~top, left, ~left), strict=True):
+        if half.sum() > 50:
+            assert seen.readings[0, part] == pytest.approx(half.sum(), abs=2)
+            assert seen.depth_log_ratio[0, part] == pytest.approx(nats[half].mean(), abs=10.0 / half.sum())
+
+
+def test_depth_speaks_for_a_surface_where_it_is_expected_and_against_an_empty_volume():
+    o = DepthLikelihood().outlier
+    there = measure(np.minimum(sphere_depth(), wall(3.0)))
+    assert (there.depth_log_ratio > 0.8).all()
+    np.testing.assert_allclose(measure(wall(5.0)).depth_log_ratio, np.log(o), atol=1e-6)
+    hidden = measure(wall(1.0))
+    assert not hidden.depth_log_ratio.any() and not hidden.readings.any()
+
+
+def test_hidden_pixels_say_nothing_of_depth():
+    """Covering the left half leaves the right half's evidence alone, and the whole is that of the right half."""
+    u, _ = middle()
+    depth = np.minimum(sphere_depth(), wall(3.0))
+    open_view = measure(depth, step=1)
+    depth[:, :u] = 1.0
+    seen = measure(depth, step=1)
+    assert seen.depth_log_ratio[0, RIGHT] == open_view.depth_log_ratio[0, RIGHT]
+    assert seen.depth_log_ratio[0, WHOLE] == pytest.approx(seen.depth_log_ratio[0, RIGHT], abs=1e-9)
+    assert seen.readings[0, LEFT] == 0 and seen.depth_log_ratio[0, LEFT] == 0.0
+    assert seen.readings[0, WHOLE] == seen.readings[0, RIGHT] == open_view.readings[0, RIGHT]
+
+
+@pytest.mark.parametrize("step", [1, 2, 4])
+def test_readings_count_at_full_resolution(step):
+    seen = measure(np.minimum(sphere_depth(), wall(3.0)), step=step)
+    assert seen.readings[0, WHOLE] == pytest.approx(seen.pixels[0], rel=0.05)
+    np.testing.assert_allclose(seen.readings[0, TOP:].sum(), 2.0 * seen.readings[0, WHOLE])
+
+
+def test_without_a_likelihood_nothing_is_said_of_depth_and_the_ratios_stay():
+    depth = np.minimum(sphere_depth(), wall(2.2))
+    depth[::3] = 1.0
+    with_it, without = measure(depth), measure(depth, likelihood=None)
+    assert with_it.depth_log_ratio.any() and not without.depth_log_ratio.any()
+    for name in ("occluded", "agreeing", "free", "missing", "in_image", "pixels", "readings"):
+        np.testing.assert_array_equal(getattr(with_it, name), getattr(without, name))
+
+
+def test_six_fields_make_a_visibility_whose_depth_says_nothing():
+    ratios = {name: np.zeros((3, 5)) for name in ("occluded", "agreeing", "free", "missing", "in_image")}
+    made = Visibility(**ratios, pixels=np.zeros(3))
+    assert made.depth_log_ratio.shape == made.readings.shape == (3, 5)
+    assert not made.depth_log_ratio.any() and not made.readings.any()
+
+
+def test_a_camera_between_two_faces_of_a_box_enters_by_the_others():
+    """The camera is level with the volume on two axes: only the near face is before it."""
+    seen = measure(wall(CENTER[2] - RADIUS - 0.05), np.array([0.0, 0.0, 2.0]), (0.5, 0.5, RADIUS), step=1)
+    assert seen.occluded[0, WHOLE] == 1.0
+    seen = measure(wall(CENTER[2] - RADIUS + 0.05), np.array([0.0, 0.0, 2.0]), (0.5, 0.5, RADIUS), step=1)
+    assert seen.agreeing[0, WHOLE] == 1.0
 
 
 def test_every_second_pixel_is_enough():
@@ -228,6 +298,7 @@ def test_every_second_pixel_is_enough():
     np.testing.assert_array_equal(fine.pixels, coarse.pixels)
     assert np.abs(fine.occluded - coarse.occluded).mean() < 0.02
     assert np.abs(fine.free - coarse.free).mean() < 0.02
+    assert np.abs(fine.depth_log_ratio - coarse.depth_log_ratio).mean() < 0.1
 
 
 def test_a_depth_image_of_another_size_is_refused():
