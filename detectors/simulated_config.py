@@ -14,6 +14,8 @@ LIMITS = {  # least and greatest; widths and strengths divide, or are parameters
     "confusion_growth": (0.0, 1000.0), "stray_share": (0.0, 1.0), "split_strength": (1e-2, 1e6),
     "box_sigma": (0.0, 1.0), "box_growth": (0.0, 100.0), "box_tail": (2.1, 1e6), "background_spots": (0, 1000),
     "spot_chance": (0.0, 1.0), "spot_sharpness": (0.0, 1000.0), "chance_rate": (0.0, 100.0),
+    "part_recall": (0.0, 1.0), "part_score": (1e-2, 1.0), "part_side": (1e-2, 10.0), "part_strip": (0.0, 1.0),
+    "part_common": (0.0, 1.0), "part_confusion": (0.0, 100.0), "part_spots": (0.0, 10.0), "part_chance": (0.0, 100.0),
 }  # fmt: skip
 
 
@@ -51,6 +53,17 @@ class SimulatedDetectorConfig:
         chance_rate: false detections a frame that do not come again.
         chance_score: beta parameters of their score.
         chance_side: pixels, least and greatest side of their boxes.
+        parts: whether templates of the four halves are scanned too; each is a detector of its own, whose numbers are
+            those above times the factors below.
+        part_recall: on `max_recall`.
+        part_score: on all mean scores.
+        part_side: on `half_side` and `score_side`, which for a half count its own pixels; with 0.71, the root of 1/2,
+            halves would be found from as far away as whole objects.
+        part_strip: on recall and score of the two halves that are cut along the object's longer side in the image.
+        part_common: share of the variance of mood and luck that a half has in common with the whole; no factor.
+        part_confusion: on the shares of wrong classes.
+        part_spots: on `spot_chance`, for each of the four.
+        part_chance: on `chance_rate`, for each of the four.
 
     Raises:
         UserError: a number outside its limits.
@@ -95,6 +108,15 @@ class SimulatedDetectorConfig:
     chance_rate: float = 0.12
     chance_score: tuple[float, float] = (1.6, 9.0)
     chance_side: tuple[float, float] = (16.0, 130.0)
+    parts: bool = False
+    part_recall: float = 0.88
+    part_score: float = 0.85
+    part_side: float = 0.75
+    part_strip: float = 0.8
+    part_common: float = 0.6
+    part_confusion: float = 1.6
+    part_spots: float = 0.5
+    part_chance: float = 2.0
 
     def __post_init__(self) -> None:
         for name, (low, high) in LIMITS.items():

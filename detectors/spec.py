@@ -2,7 +2,7 @@
 
     onnx:PATH       names=FILE confidence=0.1 nms=0.5 max=100 backend=opencv size=640x480 family=yolox-decoded
     recorded:PATH   format=coco names=FILE label=cabinet images=FILE
-    simulated       seed=1 max_recall=0.96 background_spots=5 chance_rate=0.12 ...
+    simulated       seed=1 parts=1 max_recall=0.96 background_spots=5 chance_rate=0.12 ...
     none
 
 Options follow a question mark: `onnx:model.onnx?confidence=0.2&backend=opencv`. `OnnxDetector` and
@@ -117,8 +117,15 @@ def _size(text: str) -> tuple[int, int]:
     return int(width), int(height or width)
 
 
-_NUMBERS = [field for field in fields(SimulatedDetectorConfig) if isinstance(field.default, int | float)]
-_MEANING = {int: "a whole number", float: "a number", _size: "a size such as 640x480"}
+def _switch(text: str) -> bool:
+    """`1` or `0`."""
+    if text not in ("0", "1"):
+        raise ValueError(text)
+    return text == "1"
+
+
+_NUMBERS = {f.name: f.default for f in fields(SimulatedDetectorConfig) if isinstance(f.default, int | float)}
+_MEANING = {int: "a whole number", float: "a number", _switch: "0 or 1", _size: "a size such as 640x480"}
 
 
 class _Kind(NamedTuple):
@@ -160,7 +167,10 @@ _KINDS = {
         "simulated",
         False,
         _make_simulated,
-        {"seed": ("seed", int), **{field.name: (field.name, type(field.default)) for field in _NUMBERS}},
+        {
+            "seed": ("seed", int),
+            **{name: (name, _switch if isinstance(value, bool) else type(value)) for name, value in _NUMBERS.items()},
+        },
     ),
     "none": _Kind("none", False, _make_none, {}),
 }

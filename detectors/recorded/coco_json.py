@@ -3,7 +3,8 @@
 A result is `{"image_id", "category_id", "bbox": [x, y, w, h], "score"}`. Names of images and classes come from a COCO
 dict: the file itself, the one that the option `images` gives, or `annotations.json` beside the results. Without one,
 an `image_id` that is text is a frame's name and one that is a number its position in the sequence, from 0; category
-ids are then those of COCO's own 80 classes, 1 to 90.
+ids are then those of COCO's own 80 classes, 1 to 90. COCO has only whole objects; a result of a half's template may add
+its `part`, a number as in our own format.
 """
 
 from __future__ import annotations
@@ -11,11 +12,12 @@ from __future__ import annotations
 import logging
 from collections import defaultdict
 from collections.abc import Hashable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..coco import COCO_CATEGORIES
-from ..detections import Detections
+from ..detections import Detections, Part
 from ..detections_from import from_coco
 from .reading import load_json
 from .recording import Malformed, MatchedBy, ReadOptions, Recording, add_frame, frame_key, within
@@ -80,5 +82,6 @@ def _detections(groups: Iterable[tuple[Any, list[dict]]], categories: Any) -> di
     frames = {}
     for key, results in groups:
         with within(f"frame {key!r}"):
-            frames[key] = from_coco(results, categories)
+            part = [result.get("part", Part.WHOLE) for result in results]
+            frames[key] = replace(from_coco(results, categories), part=part)  # type: ignore[arg-type]
     return frames

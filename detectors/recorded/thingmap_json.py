@@ -6,7 +6,8 @@
     ]}
 
 Boxes are in pixels of the frame. A row of `scores` has a number per class; where only some are known it is
-`{"0": 0.9}`, by class number (`null` in a row means the same). `part` may be left out (whole objects). `mask` is
+`{"0": 0.9}`, by class number (`null` in a row means the same). `part` is 0 for the whole object, and 1 to 4 for the
+top, bottom, left and right half; it may be left out (whole objects). `mask` is
 `{"size": [H, W], "counts": [...]}` with the run lengths of each mask, `embedding` is `{"size": D, "values": [[...]]}`.
 Numbers have as many digits as reading them back exactly takes.
 """

@@ -128,6 +128,31 @@ def test_wrong_coco(tmp_path: Path, content, message: str):
     assert error.value.path == path and "format coco" in error.value.expected
 
 
+def test_parts_of_foreign_formats_are_read(tmp_path: Path, make_frame):
+    coco = save(tmp_path / "coco.json", [result("a", 47, part=3), result("a", 47), result("b", 47, part=1)])
+    recorded = RecordedDetections(coco)
+    assert recorded(make_frame("a")).part.tolist() == [3, 0] and recorded(make_frame("b")).part.tolist() == [1]
+    one = {"category_id": CUP, "detection_score": 0.5, "bbox": [1, 2, 3, 4]}
+    frames = [{"file_name": "a.png", "detections": [one, one | {"part": 4}]}, {"file_name": "b.png", "detections": []}]
+    recorded = RecordedDetections(save(tmp_path / "oaslam.json", frames))
+    assert recorded(make_frame("a")).part.tolist() == [0, 4] and len(recorded(make_frame("b"))) == 0
+
+
+@pytest.mark.parametrize("part", [5, -1, 0.5, None, "left", {"left": 1}])
+def test_parts_that_are_none(tmp_path: Path, part):
+    with pytest.raises(InputError, match="frame 'a': part must hold values of Part"):
+        RecordedDetections(save(tmp_path / "coco.json", [result("a", 47), result("a", 47, part=part)]))
+
+
+@pytest.mark.parametrize("columns", [7, 8])
+def test_formats_without_room_for_parts_refuse_them(tmp_path: Path, columns: int):
+    (tmp_path / "000.txt").write_text(" ".join(["0.5"] * columns))
+    with pytest.raises(InputError, match=f"{columns} numbers instead of 5 or 6"):
+        RecordedDetections(tmp_path)
+    with pytest.raises(InputError, match=f"{columns} numbers instead of 5"):
+        RecordedDetections(tmp_path, "boxes", label="cup")
+
+
 def test_a_list_of_images_that_is_none(tmp_path: Path):
     path = save(tmp_path / "a.json", [result(1)])
     with pytest.raises(InputError, match="no such file"):
