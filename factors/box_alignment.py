@@ -9,6 +9,11 @@ detection. Centre and scale are linear in the four sides, so the same Gaussian i
 Their variances, 0.25 for the centre and 0.5 for the scale, are relative to the detection's scale and belong to one
 detector; here the caller gives the standard deviation of a side in pixels and divides it by sqrt(visibility).
 
+A template for half an object answers with a box of that half, which is compared with the same half of the projected
+box: b becomes A_part b, linear as well (here for the left half),
+
+    A_left b = [b0, b1, (b0 + b2) / 2, b3],      J_left = A_left J.
+
 A side cut off by the image border (or by an occluder) is censored: the true side lies at or beyond the reported one,
 so the residual is zero there and the distance to it on the near side.
 """
@@ -21,7 +26,11 @@ from numba import njit
 
 from ..datasets.frame import Intrinsics
 from .robust import huber
+from .visibility import VolumePart
 from .volume import project_kernel
+
+# By `VolumePart`: the side of a half's box that is the middle of the whole box; it lies opposite the side it replaces.
+_MIDDLE_SIDE = (-1, 3, 1, 2, 0)
 
 
 def box_alignment_factor(
@@ -33,20 +42,22 @@ def box_alignment_factor(
     intrinsics: Intrinsics,
     R_world_upright: np.ndarray,
     sigma_px: float,
+    part: int = VolumePart.WHOLE,
 ) -> gtsam.CustomFactor:
-    """Ties a pose, an object's centre and its log half-axes by one detected box of the whole object.
+    """Ties a pose, an object's centre and its log half-axes by one detected box of the object or of one of its halves.
 
     Args:
         x_key, l_key, s_key: keys of a Pose3 T_world_camera, a Point3 (metres) and a Vector3 of log half-axes.
-        xyxy: (4,) pixels, the detected box.
+        xyxy: (4,) pixels, the detected box of the part.
         sides_seen: (4,) bool; False where the side is only a bound because the image border or an occluder cuts it.
         R_world_upright: (3, 3) axes of the volume in world coordinates.
         sigma_px: standard deviation of one side, pixels.
+        part: `VolumePart`, what the box shows.
 
     The factor is switched off (zero residual and Jacobian) while the volume reaches the camera plane.
 
     Raises:
-        ValueError: for a box that is not finite or not ordered, or a sigma that is not positive.
+        ValueError: for a box that is not finite or not ordered, or a sigma that is not positive, or an unknown part.
     """
     measured, seen = np.array(xyxy, dtype=float), np.array(sides_seen, dtype=np.bool_)
     if measured.shape != (4,) or not (np.isfinite(measured).all() and (measured[:2] < measured[2:]).all()):
@@ -55,6 +66,7 @@ def box_alignment_factor(
         raise ValueError(f"sides_seen must have shape (4,), but got {seen.shape}")
     if not 0.0 < sigma_px < np.inf:
         raise ValueError(f"sigma_px must be positive, but got {sigma_px}")
+    middle = _MIDDLE_SIDE[VolumePart(part)]
     # A detector may draw a clipped side some pixels inside or outside the border; what is certain is the laxer bound.
     inside = np.array([-0.5, -0.5, intrinsics.width - 0.5, intrinsics.height - 0.5])
     lax = np.concatenate([np.maximum(measured[:2], inside[:2]), np.minimum(measured[2:], inside[2:])])
@@ -67,7 +79,7 @@ def box_alignment_factor(
 
     def error(this: gtsam.CustomFactor, values: gtsam.Values, H: list[np.ndarray] | None) -> np.ndarray:
         pose, center, size = values.atPose3(x_key).matrix(), values.atPoint3(l_key), values.atVector(s_key)
-        _residual(pose, R, center, size, measured, seen, focal, principal, residual, J, H is not None)
+        _residual(pose, R, center, size, measured, seen, middle, focal, principal, residual, J, H is not None)
         if H is not None:
             H[0], H[1], H[2] = J_pose, J_center, J_size
         return residual
@@ -76,11 +88,16 @@ def box_alignment_factor(
 
 
 @njit(cache=True)
-def _residual(pose, R, center, log_half_axes, measured, seen, focal, principal, residual, J, with_jacobian):
+def _residual(pose, R, center, log_half_axes, measured, seen, middle, focal, principal, residual, J, with_jacobian):
     """Fill residual (4,) in pixels and J (4, 12)."""
     if not project_kernel(pose, R, center, log_half_axes, residual, J, with_jacobian):
         residual[:] = 0.0
         return
+    if middle >= 0:  # A_part
+        opposite = (middle + 2) % 4
+        residual[middle] = (residual[middle] + residual[opposite]) / 2.0
+        if with_jacobian:
+            J[middle] = (J[middle] + J[opposite]) / 2.0
     for side in range(4):
         axis = side % 2
         r = focal[axis] * residual[side] + principal[axis] - measured[side]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import MISSING, Field, dataclass, field, fields
 from pathlib import Path
 from zipfile import BadZipFile
 
@@ -17,7 +17,8 @@ import numpy as np
 
 from ...datasets.errors import InputError
 
-SCHEMA = "thingmap-ledger/1"
+SCHEMA = "thingmap-ledger/2"
+_READABLE = ("thingmap-ledger/1", SCHEMA)  # 1 knew no parts: what has a default since is filled with it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,35 +89,46 @@ class DepthCentre:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Box:
-    """Detection box (4,) pixels; (4,) bool, sides that are not cut off by the image border; sigma in pixels."""
+    """Detection box (4,) pixels; (4,) bool, sides that are not cut off by the image border; sigma in pixels.
+
+    `part` is the `VolumePart` that the box shows.
+    """
 
     keyframe: int
     landmark: int
     xyxy: np.ndarray
     sides_seen: np.ndarray
     sigma_px: float
+    part: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """What one keyframe said about a landmark: weighted hits, misses and log likelihood of the free ratio (nats)."""
+    """What one keyframe said about a landmark: weighted hits, misses and log likelihood of the free ratio (nats).
+
+    `visible` (5,) is the share of every `VolumePart` that was seen, `depth` the weighted mean log ratio of the depth
+    likelihood (nats).
+    """
 
     keyframe: int
     landmark: int
     hits: float
     misses: float
     free: float
+    visible: np.ndarray = field(default_factory=lambda: np.ones(5, dtype=np.float32))
+    depth: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scores:
-    """Detector scores (K,) of a landmark, its occlusion then, and the view's weight."""
+    """Detector scores (K,) of a landmark's `VolumePart`, the part's occlusion then, and the view's weight."""
 
     keyframe: int
     landmark: int
     scores: np.ndarray
     occlusion: float
     weight: float
+    part: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -195,7 +207,7 @@ class Ledger:
             with np.load(path, allow_pickle=False) as file:
                 arrays = {name: file[name] for name in file.files}
             meta = json.loads(str(arrays.pop("meta")))
-            if meta["schema"] != SCHEMA:
+            if meta["schema"] not in _READABLE:
                 raise ValueError(f"schema {meta['schema']!r} instead of {SCHEMA!r}")
             records = _records(arrays)
         # a damaged archive fails in NumPy, zipfile, zlib or here, in many ways
@@ -212,10 +224,17 @@ def _records(arrays: dict[str, np.ndarray]) -> list[Record]:
     numbered: list[tuple[int, Record]] = []
     for kind in KINDS:
         numbers = arrays.get(f"{kind.__name__}/number", np.empty(0, dtype=int))
-        columns = [_column(arrays[f"{kind.__name__}/{f.name}"], f.type) for f in fields(kind) if len(numbers)]
-        rows = list(zip(numbers, *columns, strict=True))
-        numbered += [(int(number), kind(*row)) for number, *row in rows]
+        written = [f for f in fields(kind) if len(numbers) and not _is_left_out(arrays, kind, f)]
+        columns = [_column(arrays[f"{kind.__name__}/{f.name}"], f.type) for f in written]
+        for number, *row in zip(numbers, *columns, strict=True):
+            numbered.append((int(number), kind(**{f.name: v for f, v in zip(written, row, strict=True)})))
     return [record for _, record in sorted(numbered, key=lambda item: item[0])]
+
+
+def _is_left_out(arrays: dict[str, np.ndarray], kind: type, column: Field) -> bool:
+    """Whether a column that was added later, and has a default since, is not in the file."""
+    has_default = column.default is not MISSING or column.default_factory is not MISSING
+    return has_default and f"{kind.__name__}/{column.name}" not in arrays
 
 
 def _column(values: np.ndarray, kind: object) -> list:

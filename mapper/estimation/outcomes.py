@@ -10,7 +10,7 @@ class Outcome(Enum):
 
     # detections
     LOW_CONFIDENCE = "detection below the confidence threshold"
-    PART_UNUSED = "detection of an object part; only whole objects are used"
+    PART_UNUSED = "detection of an object part, where parts are switched off"
     NO_DEPTH = "detection without enough depth readings"
     OUT_OF_RANGE = "detection beyond the depth range"
     ASSOCIATED = "detection of a landmark"
@@ -24,6 +24,7 @@ class Outcome(Enum):
     # landmarks and views
     SUPPORTED = "landmark seen"
     FULLY_OCCLUDED = "landmark hidden in this view"
+    UNCLEAR = "landmark in sight, too small or too much hidden to be found for sure"
     MISSED = "landmark missed where it should have been seen"
     SEEN_THROUGH = "landmark's volume is empty in this view"
     OUT_OF_VIEW = "landmark outside the image"

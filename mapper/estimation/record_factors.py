@@ -27,8 +27,8 @@ from ...factors.depth_centre import depth_centre_factor
 from ...factors.guard import position_guard, size_guard
 from ...factors.odometry import between_factor, gauge_prior
 from ..config import SmootherConfig
-from .beliefs import SizeSite
 from .ledger import Box, DepthCentre, Gauge, Motion, NewLandmark, Record, Up, UpPrior, Visual
+from .size_site import SizeSite
 
 UP = U(0)
 
@@ -84,7 +84,7 @@ def record_factors(record: Record, context: FactorContext) -> list[gtsam.Nonline
             j = context.owner(record.landmark)
             keys = context.seen_from(record), L(j), S(j)
             box = record.xyxy, record.sides_seen, context.intrinsics, context.R_world_upright, record.sigma_px
-            return [box_alignment_factor(*keys, *box)]
+            return [box_alignment_factor(*keys, *box, record.part)]
         case _:
             return []
 

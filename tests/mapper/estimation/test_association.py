@@ -9,11 +9,10 @@ import pytest
 from numpy.typing import ArrayLike
 
 from thingmap.datasets.frame import Intrinsics
-from thingmap.factors.appearance import AppearanceModel
-from thingmap.factors.free_space import FreeSpace
-from thingmap.factors.missed import DetectionRate
+from thingmap.factors.evidence_model import generic_evidence_model
+from thingmap.factors.score_model import ScoreModel
 from thingmap.factors.volume import project_volumes
-from thingmap.mapper.config import AssociationConfig, BeliefConfig
+from thingmap.mapper.config import AssociationConfig
 from thingmap.mapper.estimation.association import Assignment, Targets, associate
 from thingmap.mapper.estimation.beliefs import Belief
 from thingmap.mapper.estimation.evidence import class_evidence
@@ -29,7 +28,16 @@ SIZES = np.log(HALF_AXES)
 class Member:
     """All that `class_evidence` asks of a member of the scene."""
 
-    belief: Belief = field(default_factory=lambda: Belief(3, BeliefConfig(), DetectionRate(), FreeSpace()))
+    belief: Belief = field(default_factory=lambda: Belief(3, generic_evidence_model()))
+
+
+def named_as(belief: Belief, model: ScoreModel, scores: np.ndarray, views: int) -> Belief:
+    """Detected with these scores from `views` places 0.2 rad apart."""
+    for angle in 0.2 * np.arange(views):
+        place = np.array([np.cos(angle), np.sin(angle), 0.0])
+        belief.look(place, hits=1.0, scores=model.evidence(scores, 0.0))
+    belief.update()
+    return belief
 
 
 def box_at(centre: ArrayLike, half_axes: ArrayLike = HALF_AXES, T: np.ndarray | None = None) -> np.ndarray:
@@ -198,13 +206,10 @@ def test_between_equal_places_the_class_decides():
 @pytest.mark.parametrize("classes", [2, 6, 80, 1200])
 def test_the_class_never_gates(classes):
     """A thing that everybody was sure was the first class is now named the second with the highest score there is."""
-    rate, model = DetectionRate(), AppearanceModel()
+    model = generic_evidence_model().bind([f"class {k}" for k in range(classes)]).scores
     sure, named = np.full(classes, 0.01), np.full(classes, 0.0)
     sure[0], named[1] = 0.9, 1.0
-    member = Member(Belief(classes, BeliefConfig(), rate, FreeSpace()))
-    for _ in range(30):
-        member.belief.add_scores(model.evidence(sure, 0.0), 1.0)
-    member.belief.update()
+    member = Member(named_as(Belief(classes, generic_evidence_model()), model, sure, 30))
     assert member.belief.class_posterior()[0] > 0.999
     for scores in (named, np.where(named > 0.0, 1.0, np.nan)):
         evidence = class_evidence([model.evidence(scores, 0.0)], [member])  # type: ignore[list-item]
@@ -213,7 +218,7 @@ def test_the_class_never_gates(classes):
 
 
 def test_class_evidence_of_nothing_and_of_an_open_posterior():
-    model = AppearanceModel()
+    model = generic_evidence_model().bind("abc").scores
     scores = [model.evidence(np.array([0.6, 0.1, 0.1]), 0.0)]
     assert class_evidence([], [Member()]).shape == (0, 1)  # type: ignore[list-item]
     assert class_evidence(scores, []).shape == (1, 0)
@@ -221,12 +226,10 @@ def test_class_evidence_of_nothing_and_of_an_open_posterior():
 
 
 def test_class_evidence_favours_the_member_of_the_named_class():
-    model, members = AppearanceModel(), [Member(), Member()]
+    model, members = generic_evidence_model().bind("abc").scores, [Member(), Member()]
     for k, member in enumerate(members):
         own = np.full(3, 0.02)
         own[k] = 0.6
-        for _ in range(3):
-            member.belief.add_scores(model.evidence(own, 0.0), 1.0)
-        member.belief.update()
+        named_as(member.belief, model, own, 3)
     evidence = class_evidence([model.evidence(np.array([0.02, 0.6, 0.02]), 0.0)], members)  # type: ignore[list-item]
     assert evidence[0, 1] > 0.5 > 0.0 > evidence[0, 0]

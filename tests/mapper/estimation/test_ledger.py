@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -46,9 +46,9 @@ def one_of_each(rng: np.random.Generator) -> list:
         NewLandmark(3, rng.normal(size=3), rng.normal(size=3)),
         Site(3, rng.normal(size=3), rng.random((3, 3))),
         DepthCentre(1, 3, rng.normal(size=3), 0.02, 0.05, 0.75),
-        Box(1, 3, 100.0 * rng.random(4), np.array([True, False, True, True]), 3.5),
-        Look(1, 3, 0.8, 0.0, -0.25),
-        Scores(1, 3, np.array([0.5, np.nan, 0.1], dtype=np.float32), 0.3, 0.9),
+        Box(1, 3, 100.0 * rng.random(4), np.array([True, False, True, True]), 3.5, 4),
+        Look(1, 3, 0.8, 0.0, -0.25, rng.random(5, dtype=np.float32), -1.5),
+        Scores(1, 3, np.array([0.5, np.nan, 0.1], dtype=np.float32), 0.3, 0.9, 2),
         Merge(3, 4),
         Retire(3),
     ]
@@ -87,6 +87,33 @@ def test_what_was_saved_is_loaded_in_the_same_order(tmp_path, order, seed):
     assert len(loaded) == len(ledger)
     for a, b in zip(ledger, loaded, strict=True):
         assert_same(a, b)
+
+
+def before_parts(path: Path) -> None:
+    """Makes a file what it was before detections had parts."""
+    with np.load(path) as file:
+        later = ("Box/part", "Look/visible", "Look/depth", "Scores/part")
+        arrays = {name: file[name] for name in file.files if name not in later}
+    arrays["meta"] = meta(schema="thingmap-ledger/1")
+    np.savez(path, **arrays)
+
+
+def test_a_ledger_from_before_parts_tells_of_whole_objects(tmp_path):
+    ledger, path = Ledger(), tmp_path / "ledger.npz"
+    for record in one_of_each(np.random.default_rng(0)):
+        ledger.append(record)
+    ledger.save(path)
+    before_parts(path)
+    loaded, _ = Ledger.load(path)
+    plain = {Box: {"part": 0}, Look: {"visible": np.ones(5, np.float32), "depth": 0.0}, Scores: {"part": 0}}
+    assert len(loaded) == len(ledger)
+    for old, new in zip(loaded, ledger, strict=True):
+        assert_same(old, replace(new, **plain.get(type(new), {})))
+
+
+def test_what_is_not_said_of_a_look_is_full_visibility_and_no_word_from_depth():
+    look = Look(1, 3, 0.8, 0.0, -0.25)
+    assert look.visible.tolist() == [1.0] * 5 and look.visible.dtype == np.float32 and look.depth == 0.0
 
 
 def test_a_ledger_is_saved_under_the_very_name_that_was_given(tmp_path):

@@ -9,13 +9,16 @@ from hypothesis import strategies as st
 
 from thingmap.datasets.frame import Frame, Intrinsics
 from thingmap.detectors.detections import Detections, Part
+from thingmap.detectors.parts import part_box
 from thingmap.mapper.config import LiftingConfig
-from thingmap.mapper.estimation.lifting import LiftedDetection, lift, lift_box
+from thingmap.mapper.estimation.lifting import HALF_RANGE, HALF_TANGENTIAL, LiftedDetection, lift, lift_box
 from thingmap.mapper.estimation.outcomes import Outcome
 
 CAMERA = Intrinsics(320, 240, 262.5, 262.5, 159.5, 119.5)
 CONFIG = LiftingConfig()
 SCORES = np.array([0.7, 0.1])
+HALVES = [Part.TOP, Part.BOTTOM, Part.LEFT, Part.RIGHT]
+EVERY_HALF = pytest.mark.parametrize("part", HALVES, ids=lambda part: part.name.lower())
 
 
 def frame(depth: np.ndarray | float) -> Frame:
@@ -24,8 +27,10 @@ def frame(depth: np.ndarray | float) -> Frame:
     return Frame(0, "frame-000000", 0.0, color, image, CAMERA)
 
 
-def lifted(xyxy, depth: np.ndarray | float = 2.0, config: LiftingConfig = CONFIG) -> LiftedDetection:
-    result = lift_box(np.array(xyxy, dtype=float), SCORES, frame(depth), config)
+def lifted(
+    xyxy, depth: np.ndarray | float = 2.0, config: LiftingConfig = CONFIG, part: Part = Part.WHOLE
+) -> LiftedDetection:
+    result = lift_box(np.array(xyxy, dtype=float), SCORES, frame(depth), config, part)
     assert isinstance(result, LiftedDetection), result
     return result
 
@@ -153,11 +158,81 @@ def test_a_few_readings_are_enough():
     assert lift_box(np.array(about(159.5, 119.5)), SCORES, frame(depth), CONFIG) is Outcome.NO_DEPTH
 
 
+@EVERY_HALF
+def test_a_half_is_lifted_as_the_whole_that_it_implies(part):
+    whole = np.array(about(150.0, 110.0))
+    half, full = lifted(part_box(whole, part), part=part), lifted(whole)
+    np.testing.assert_allclose(half.whole_xyxy, whole)
+    np.testing.assert_allclose(half.xyxy, part_box(whole, part))
+    np.testing.assert_allclose(half.centre, full.centre)
+    np.testing.assert_allclose(half.half_extents, full.half_extents)
+    assert half.part == part and half.sigma_px == full.sigma_px
+    assert half.sigma_range == pytest.approx(HALF_RANGE * full.sigma_range) and HALF_RANGE > 1.0
+    assert half.sigma_tangential == pytest.approx(HALF_TANGENTIAL * full.sigma_tangential) and HALF_TANGENTIAL > 1.0
+
+
+@EVERY_HALF
+def test_depth_is_read_where_the_half_is(part):
+    """Something stands before the other half."""
+    whole = np.array(about(159.5, 119.5))
+    other = {Part.TOP: Part.BOTTOM, Part.BOTTOM: Part.TOP, Part.LEFT: Part.RIGHT, Part.RIGHT: Part.LEFT}[part]
+    x0, y0, x1, y1 = np.round(part_box(whole, other)).astype(int)
+    depth = np.full((240, 320), 2.0, dtype=np.float32)
+    depth[y0:y1, x0:x1] = 0.8
+    clear = lifted(part_box(whole, part), part=part)
+    np.testing.assert_allclose(lifted(part_box(whole, part), depth, part=part).centre, clear.centre)
+    assert lifted(part_box(whole, other), depth, part=other).centre[2] < 1.0
+
+
+def test_of_a_half_the_image_border_cuts_the_measured_box_only():
+    """The whole object reaches out of the image on the right, where its left half does not come near the border."""
+    found = lifted([260.0, 60.0, 300.0, 120.0], part=Part.LEFT)
+    assert found.whole_xyxy[2] == 340.0 and found.sides_seen.all()
+    assert CAMERA.project(found.centre[None])[0][0] == pytest.approx(300.0)
+    cut = lifted([0.0, 60.0, 40.0, 120.0], part=Part.LEFT)
+    assert cut.sides_seen.tolist() == [False, True, True, True]
+    assert cut.sigma_tangential == pytest.approx(HALF_TANGENTIAL * np.sqrt(cut.half_extents[0] * cut.half_extents[2]))
+
+
+def test_best_class_and_score_look_past_what_is_unknown():
+    found = lift_box(np.array(about(160.0, 120.0)), np.array([np.nan, 0.2, 0.6, np.nan]), frame(2.0), CONFIG)
+    assert isinstance(found, LiftedDetection)
+    assert found.class_id == 2 and found.confidence == 0.6
+
+
+def test_the_whole_is_its_own_box():
+    found = lifted(about(160.0, 120.0))
+    assert found.part == Part.WHOLE and found.whole_xyxy is found.xyxy
+    plain = LiftedDetection(
+        SCORES, np.arange(4.0), np.ones(4, bool), 1.0, np.array([0.0, 0.0, 2.0]), 0.3, 0.1, np.ones(3)
+    )
+    assert plain.part == Part.WHOLE and plain.whole_xyxy is plain.xyxy
+
+
+def test_halves_are_left_out_where_they_are_not_used():
+    boxes = np.array([about(160.0, 120.0)] * 5)
+    found = Detections(("cup", "bowl"), boxes, np.tile(SCORES, (5, 1)), np.array(list(Part)))
+    every, none = lift(found, frame(2.0), CONFIG)
+    assert [d.part for d in every] == list(Part) and none == []
+    whole, refused = lift(found, frame(2.0), CONFIG, use_parts=False)
+    assert [d.part for d in whole] == [Part.WHOLE] and refused == [Outcome.PART_UNUSED] * 4
+
+
+def test_halves_are_made_whole_before_half_a_pixel_is_taken_off():
+    """Detectors count from the image's edge; the implied whole is that of `whole_box` in either way of counting."""
+    (found,), _ = lift(
+        Detections(("cup", "bowl"), np.array([[100.0, 80.0, 140.0, 140.0]]), SCORES[None], np.array([Part.RIGHT])),
+        frame(2.0),
+        CONFIG,
+    )
+    np.testing.assert_allclose(found.whole_xyxy, [59.5, 79.5, 139.5, 139.5])
+
+
 def test_every_detection_is_lifted_or_refused_with_a_reason():
     scores = np.array([[0.7, np.nan], [0.05, 0.07], [0.9, 0.1], [np.nan, 0.08], [0.3, 0.6]])
     boxes = np.array([about(160.0, 120.0)] * 4 + [about(-99.0, 120.0)])
     part = np.array([Part.WHOLE, Part.WHOLE, Part.TOP, Part.WHOLE, Part.WHOLE])
-    found, refused = lift(Detections(("cup", "bowl"), boxes, scores, part), frame(2.0), CONFIG)
+    found, refused = lift(Detections(("cup", "bowl"), boxes, scores, part), frame(2.0), CONFIG, use_parts=False)
     assert len(found) == 2
     assert refused == [Outcome.LOW_CONFIDENCE, Outcome.PART_UNUSED, Outcome.NO_DEPTH]
     np.testing.assert_array_equal(found[1].scores, scores[3])

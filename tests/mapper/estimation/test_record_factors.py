@@ -8,9 +8,9 @@ import pytest
 from gtsam.symbol_shorthand import L, S, X
 
 from thingmap.datasets.frame import Intrinsics
+from thingmap.detectors.parts import part_box
 from thingmap.factors.volume import project_volumes
 from thingmap.mapper.config import SmootherConfig
-from thingmap.mapper.estimation.beliefs import SizeSite
 from thingmap.mapper.estimation.ledger import (
     Box,
     DepthCentre,
@@ -27,6 +27,7 @@ from thingmap.mapper.estimation.ledger import (
     Visual,
 )
 from thingmap.mapper.estimation.record_factors import UP, FactorContext, record_factors, site_factor
+from thingmap.mapper.estimation.size_site import SizeSite
 
 KINECT = Intrinsics(640, 480, 525.0, 525.0, 319.5, 239.5)
 R_LEANING = gtsam.Rot3.Rx(0.3).matrix()
@@ -91,6 +92,15 @@ def test_exact_measurements_cost_nothing():
     ):
         for factor in record_factors(record, context(R=R_LEANING)):
             assert factor.error(values()) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("part", range(1, 5))
+def test_the_box_of_a_half_is_compared_with_that_half(part):
+    whole = project_volumes(np.eye(4), R_LEANING, PLACE[None], LOG_SIZE[None], KINECT)[0][0]
+    half = part_box(whole, part)
+    for named in range(5):
+        (factor,) = record_factors(Box(0, 1, half, np.ones(4, bool), 2.0, named), context(R=R_LEANING))
+        assert (factor.error(values()) < 1e-12) == (named == part)
 
 
 def test_boxes_are_read_in_the_upright_frame():
