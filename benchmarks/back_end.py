@@ -17,6 +17,7 @@ from back_end_views import SimulatedView
 from back_end_world import KINECT, UP, World, clip
 
 from thingmap.datasets.frame import Frame
+from thingmap.factors.evidence_model import generic_evidence_model
 from thingmap.factors.visibility import Visibility, VolumePart
 from thingmap.factors.volume import project_volumes
 from thingmap.mapper.config import MapperConfig
@@ -63,12 +64,10 @@ class BackEnd:
         self.smoother = Smoother(self.config.smoother, KINECT, self.config.up.upright_tolerance)
         self.outcomes: Counter[Outcome] = Counter()
         self.world = world
-        self._models = self.config.evidence
-        self._observer = Observer(self.scene, self.smoother, self._models, self.outcomes)
-        configs = self.config.tracks, self.config.beliefs, self.config.lifecycle
-        self._lifecycle = Lifecycle(
-            self.scene, self.smoother, self._observer, world.priors, self._models, configs, self.outcomes
-        )
+        self._model = generic_evidence_model().bind(world.priors.classes)
+        self._observer = Observer(self.scene, self.smoother, self._model, self.config.evidence, self.outcomes)
+        members = self.scene, self.smoother, self._observer
+        self._lifecycle = Lifecycle(*members, world.priors, self._model, self.config, self.outcomes)
         self._thing_of: WeakKeyDictionary[Belief, int] = WeakKeyDictionary()  # a track's belief becomes its landmark's
 
     def thing_of(self, belief: Belief) -> int:
@@ -86,7 +85,7 @@ class BackEnd:
         targets, visibility = self._predict(view, simulated)
         assignment = self._assign(things)
         with stage("factors"):
-            scores = score_evidence(lifted, self._models.appearance)
+            scores = score_evidence(lifted, self._model)
             touched = self._observer.observe(view, lifted, assignment, targets, visibility)
             before = len(self.scene.tracks)
             lifecycle.start_tracks(view, lifted, scores, assignment)

@@ -9,7 +9,7 @@ import numpy as np
 from back_end_world import KINECT, UP, World, camera_poses, clip, score_vector
 from scipy.spatial.transform import Rotation
 
-from thingmap.factors.missed import DetectionRate
+from thingmap.factors.evidence_model import generic_evidence_model
 from thingmap.mapper.config import LiftingConfig, UpConfig, VisualConfig
 from thingmap.mapper.estimation.lifting import LiftedDetection
 from thingmap.mapper.trajectory.odometry import inverse
@@ -17,6 +17,7 @@ from thingmap.mapper.trajectory.odometry import inverse
 ODOMETRY_SIGMAS = np.repeat([0.002, 0.004], 3)  # rad, m: one keyframe step of KISS-ICP on hand-held RGB-D
 MIN_IN_IMAGE = 0.4  # share of a box in the image below which a detector does not respond
 BORDER = LiftingConfig().border
+DETECTION = generic_evidence_model().detection
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +96,7 @@ def _detections(
 ) -> dict[int, LiftedDetection]:
     sides = np.maximum(xyxy[:, 2:] - xyxy[:, :2], 0.0)
     visible = in_image * (1.0 - occluded)
-    chance = world.rate * DetectionRate().expected(visible, np.sqrt(sides.prod(axis=1)))
+    chance = world.rate * DETECTION.relative(visible, np.sqrt(sides.prod(axis=1)))
     found = np.flatnonzero((rng.random(len(world)) < chance) & (in_image > MIN_IN_IMAGE))
     detections = {}
     for j in found.tolist():

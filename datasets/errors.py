@@ -22,3 +22,7 @@ class InputError(UserError):
     def __init__(self, path: str | Path, expected: str, found: str, remedy: str) -> None:
         self.path, self.expected, self.found, self.remedy = Path(path), expected, found, remedy
         super().__init__(f"{path}: expected {expected}, found {found}; {remedy}")
+
+    def __reduce__(self) -> tuple[type[InputError], tuple[Path, str, str, str]]:
+        # Exception pickles its one message; a worker process could not hand the error back
+        return type(self), (self.path, self.expected, self.found, self.remedy)

@@ -35,12 +35,12 @@ _SIZE_NODES, _SIZE_WEIGHTS = np.polynomial.hermite_e.hermegauss(5)
 class ClassSizePriors:
     """Gaussians on log half-axes (log of metres) along the axes of the upright frame, z vertical.
 
-    Row 0 is "not an object", row k + 1 is `classes[k]`.
+    Row 0 is "not an object", row k + 1 is `classes[k]`, the last row "anything": what is only ever seen in part.
 
     Attributes:
         classes: K names.
-        mean: (K + 1, 3).
-        covariance: (K + 1, 3, 3).
+        mean: (K + 2, 3).
+        covariance: (K + 2, 3, 3).
         known: (K,) False where nothing is known of the class; its Gaussian is the one of row 0, so that size says
             nothing for or against it.
     """
@@ -65,9 +65,9 @@ class ClassSizePriors:
             vector: (3,) eta = Lambda s for a measured s.
 
         Returns:
-            log_z: (K + 1,) up to a constant common to all classes.
-            means: (K + 1, 3) m_k, the size if the class is k.
-            covariances: (K + 1, 3, 3) C_k.
+            log_z: (K + 2,) up to a constant common to all rows.
+            means: (K + 2, 3) m_k, the size if the class is k.
+            covariances: (K + 2, 3, 3) C_k.
         """
         eigenvalues, V = np.linalg.eigh((information + information.T) / 2.0)
         Lambda = (V * np.maximum(eigenvalues, 0.0)) @ V.T
@@ -80,10 +80,20 @@ class ClassSizePriors:
         return (fit - np.linalg.slogdet(I_plus)[1]) / 2.0, means, covariances
 
 
-def load_size_priors(classes: Sequence[str], extra: Path | None = None) -> ClassSizePriors:
+def load_size_priors(
+    classes: Sequence[str],
+    extra: Path | None = None,
+    background: tuple[np.ndarray, np.ndarray] | None = None,
+) -> ClassSizePriors:
     """Size priors of a detector's classes, from the built-in table and a user's own file of the same form.
 
     Case, `_` and `-` make no difference; names come before aliases, the user's file before the built-in one.
+
+    Args:
+        classes: of the detector.
+        extra: the user's file.
+        background: (3,) mean and (3, 3) covariance of the log half-axes of what is no object, where it is known;
+            a wide Gaussian otherwise.
 
     Raises:
         InputError: for a file that is missing or not of the form.
@@ -97,7 +107,8 @@ def load_size_priors(classes: Sequence[str], extra: Path | None = None) -> Class
     known = [entry for entry in entries if entry is not None]
     moments = {entry: marginal(entry) for entry in dict.fromkeys(known or by_name.values())}
     wide = np.mean([mean for mean, _ in moments.values()], axis=0), WIDE_SIGMA**2 * np.eye(3)
-    rows = [wide, *(wide if entry is None else moments[entry] for entry in entries)]
+    null = wide if background is None else background
+    rows = [null, *(null if entry is None else moments[entry] for entry in entries), wide]
     return ClassSizePriors(
         tuple(classes),
         np.array([mean for mean, _ in rows]),

@@ -8,9 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
-from ..factors.appearance import AppearanceModel
 from ..factors.free_space import FreeSpace
-from ..factors.missed import DetectionRate
 
 
 class OdometrySource(Enum):
@@ -112,7 +110,8 @@ class AssociationConfig:
 class TrackConfig:
     """Candidates, followed by a Kalman filter until they earn a landmark."""
 
-    min_hits: int = 3  # keyframes
+    min_existence: float = 0.3  # probability that it is an object, from which it is a landmark however few its views
+    min_hits: int = 3  # keyframes that make it a landmark however doubtful
     min_hit_rate: float = 0.3  # hits / keyframes in which it should have been seen
     max_misses: int = 6  # keyframes in a row where it should have been seen
     process_sigma: float = 0.01  # m per keyframe, odometry drift against the map
@@ -122,19 +121,29 @@ class TrackConfig:
 class BeliefConfig:
     """Class and existence: how much each kind of evidence counts."""
 
-    null_prior: float = 0.5  # prior probability that a landmark is not an object
     view_angle: float = 0.17  # rad (10 degrees): views closer than this are not independent (Georgakis et al., eq. 2)
     view_log_range: float = 0.3  # the same for log distance
-    min_weight: float = 0.05  # a repeated view still counts this much
-    score_correlation: float = 0.5  # of the score heights of one object's views: at most 2 views' worth
-    steady_confusion: float = 0.1  # objects that look like one of another class from every side
+    repeat_correlation: float = 0.9  # of looks from the same place: at most 1.1 views' worth, however many
     size_outlier: float = 0.05  # objects of which only a part is ever measured, such as chairs pushed under a table
     site_tolerance: float = 0.05  # symmetric change of a size site below which it is left as it is
     size_coupling: bool = True  # off: sizes say nothing of classes, nor classes of sizes
 
 
 @dataclass(frozen=True, slots=True)
-class EvidenceModels:
+class PresenceConfig:
+    """When a thing that was there counts as taken away."""
+
+    hazard: float = 1e-4  # probability of it between two looks: about seven clear looks make it likelier than not
+    detected: float = 3.0  # nats, a detection against it; as many as one look through it says for it at most
+    usual_most: float = (
+        0.4  # share that a first look from somewhere may show and still be usual from there; tried: with
+    )
+    # 0.3 a thing that a detector hardly ever finds is lost before a still camera, with 0.5 a cup taken away is kept
+    usual_free: float = 0.15  # share of an object's volume that is free, before it is known for the one at hand
+
+
+@dataclass(frozen=True, slots=True)
+class EvidenceConfig:
     """The likelihoods outside the graph; each says where its numbers come from.
 
     The switches turn a kind of evidence off, to measure what it is worth (benchmarks/run.py).
@@ -145,9 +154,8 @@ class EvidenceModels:
     depth: bool = True  # off: depth at an object's place says nothing for or against it
     parts: bool = True  # off: detections of object parts are not used
     model: str = ""  # path of an evidence model that `thingmap learn` wrote; "generic" for none; empty: the shipped one
-    appearance: AppearanceModel = field(default_factory=AppearanceModel)
-    rate: DetectionRate = field(default_factory=DetectionRate)
     free_space: FreeSpace = field(default_factory=FreeSpace)
+    presence: PresenceConfig = field(default_factory=PresenceConfig)
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +220,7 @@ class MapperConfig:
     association: AssociationConfig = field(default_factory=AssociationConfig)
     tracks: TrackConfig = field(default_factory=TrackConfig)
     beliefs: BeliefConfig = field(default_factory=BeliefConfig)
-    evidence: EvidenceModels = field(default_factory=EvidenceModels)
+    evidence: EvidenceConfig = field(default_factory=EvidenceConfig)
     smoother: SmootherConfig = field(default_factory=SmootherConfig)
     lifecycle: LifecycleConfig = field(default_factory=LifecycleConfig)
     batch: BatchConfig = field(default_factory=BatchConfig)

@@ -13,10 +13,12 @@ from ..datasets.errors import UserError
 from ..datasets.frame import Frame
 from ..detectors.detections import Detections
 from ..detectors.detector import Detector
+from ..factors.evidence_model import EvidenceModel, generic_evidence_model, load_evidence_model
 from ..factors.size_prior import ClassSizePriors, load_size_priors
 from .config import MapperConfig
 from .estimation.association import associate
 from .estimation.evidence import Observer, class_evidence, score_evidence
+from .estimation.landmarks import Landmark
 from .estimation.lifecycle import Lifecycle
 from .estimation.lifting import LiftedDetection, lift
 from .estimation.outcomes import Outcome
@@ -27,6 +29,8 @@ from .map.object_map import PROBABLE, ObjectMap
 from .stages import StageClock
 from .trajectory.camera import CameraGraph
 from .trajectory.cloud import KeyframeCloud
+
+GENERIC = "generic"  # name of the evidence model that was learned from nothing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,6 +58,7 @@ class SemanticMapper:
         config: every number of the mapper.
         source: name of what is mapped, kept in the map.
         gravity: (3,) unit vector pointing down in the dataset's world, where known; used with the dataset's poses.
+        model: what is known of the detector; the one that the configuration names by default.
     """
 
     def __init__(
@@ -63,10 +68,11 @@ class SemanticMapper:
         *,
         source: str = "",
         gravity: np.ndarray | None = None,
+        model: EvidenceModel | None = None,
     ) -> None:
         self.config = config or MapperConfig()
         self._detector, self._source = detector, source
-        self._models = self.config.evidence
+        self._learned = model or evidence_model(self.config.evidence.model)
         self._camera = CameraGraph(self.config, gravity)
         self._cloud = KeyframeCloud(self.config.cloud)
         self._scene = Scene()
@@ -76,6 +82,7 @@ class SemanticMapper:
         self._priors: ClassSizePriors | None = None
         self._lifecycle: Lifecycle | None = None
         self._observer: Observer | None = None
+        self._model: EvidenceModel | None = None
 
     def process_frame(self, frame: Frame, detections: Detections | None = None) -> MapUpdate:
         """Adds one frame.
@@ -103,13 +110,13 @@ class SemanticMapper:
 
     def _map(self, view: View, lifted: list[LiftedDetection]) -> None:
         """One keyframe: visibility -> association -> factors -> smoothing -> class and existence -> lifecycle."""
-        config, scene, models, stage = self.config, self._scene, self._models, self._clock.stage
-        assert self._lifecycle is not None and self._observer is not None
+        config, scene, model, stage = self.config, self._scene, self._model, self._clock.stage
+        assert self._lifecycle is not None and self._observer is not None and model is not None
         lifecycle, observer, smoother = self._lifecycle, self._observer, self._camera.smoother
         with stage("visibility"):
-            targets, visibility = scene.predict(view, config.association, models.occlusion)
+            targets, visibility = scene.predict(view, config.association, config.evidence.occlusion)
         with stage("association"):
-            scores = score_evidence(lifted, models.appearance)
+            scores = score_evidence(lifted, model)
             evidence = class_evidence(scores, scene.members())
             camera = view.T_world_camera, view.R_world_upright
             assignment = associate(lifted, targets, evidence, *camera, config.association)
@@ -126,13 +133,16 @@ class SemanticMapper:
                 lifecycle.merge()
             lifecycle.retire()
 
-    def object_map(self, include_doubtful: bool = False) -> ObjectMap:
-        """The map as estimated now; `include_doubtful` adds what exists with less than 0.5 and what was retired."""
+    def landmarks(self, include_retired: bool = False) -> tuple[Landmark, ...]:
+        """Landmarks as estimated now, for those who want to know more of them than a map tells."""
         if self._lifecycle is not None:
             self._lifecycle.bring_up_to_date()
-        landmarks = list(self._scene.landmarks.values())
-        if include_doubtful:
-            landmarks += self._scene.retired.values()
+        retired = self._scene.retired.values() if include_retired else ()
+        return (*self._scene.landmarks.values(), *retired)
+
+    def object_map(self, include_doubtful: bool = False) -> ObjectMap:
+        """The map as estimated now; `include_doubtful` adds what exists with less than 0.5 and what was retired."""
+        landmarks = self.landmarks(include_retired=include_doubtful)
         things = compose_things(landmarks, self._classes or (), 0.0 if include_doubtful else PROBABLE)
         return ObjectMap(
             things=things,
@@ -185,8 +195,9 @@ class SemanticMapper:
             detections = self._detector(frame)
         if self._priors is None:
             extra = Path(self.config.class_sizes) if self.config.class_sizes else None
-            self._priors = load_size_priors(detections.classes, extra)
             self._classes = tuple(detections.classes)
+            self._model = self._learned.bind(self._classes)
+            self._priors = load_size_priors(self._classes, extra, self._model.background_size)
         if self._classes is not None and tuple(detections.classes) != self._classes:
             raise UserError(
                 f"frame {frame.name}: expected detections over the same {len(self._classes)} classes as before, found "
@@ -197,18 +208,23 @@ class SemanticMapper:
     def _lift(self, detections: Detections, frame: Frame) -> list[LiftedDetection]:
         if self._lifecycle is None:
             self._start_back_end()
-        lifted, refused = lift(detections, frame, self.config.lifting)
+        lifted, refused = lift(detections, frame, self.config.lifting, self.config.evidence.parts)
         self._outcomes.update(refused)
         return lifted
 
     def _start_back_end(self) -> None:
-        config, smoother, priors = self.config, self._camera.smoother, self._priors
-        assert priors is not None
-        self._observer = Observer(self._scene, smoother, self._models, self._outcomes)
-        configs = config.tracks, config.beliefs, config.lifecycle
-        self._lifecycle = Lifecycle(
-            self._scene, smoother, self._observer, priors, self._models, configs, self._outcomes
-        )
+        smoother, priors, model = self._camera.smoother, self._priors, self._model
+        assert priors is not None and model is not None
+        self._observer = Observer(self._scene, smoother, model, self.config.evidence, self._outcomes)
+        members = self._scene, smoother, self._observer
+        self._lifecycle = Lifecycle(*members, priors, model, self.config, self._outcomes)
 
     def _count_things(self) -> int:
         return sum(landmark.belief.existence >= PROBABLE for landmark in self._scene.landmarks.values())
+
+
+def evidence_model(name: str) -> EvidenceModel:
+    """The evidence model that a configuration names: a file, "generic" for none, or empty for the shipped one."""
+    if name == GENERIC:
+        return generic_evidence_model()
+    return load_evidence_model(Path(name) if name else None)

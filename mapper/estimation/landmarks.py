@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .beliefs import Belief
+from .size_site import SizeSite
+from .view_log import ViewLog
 
 
 @dataclass(slots=True, eq=False)
@@ -20,8 +22,11 @@ class Landmark:
         log_size, log_size_covariance: (3,), (3, 3) log half-axes in the upright frame.
         first_seen, last_seen: stamps, seconds.
         supporting, occluded, contradicting: keyframes that spoke for it, could not see it, spoke against it.
+        unsettled: whether its size site was still changing at the last full refresh.
         refreshed_at: number of measurements at the last full refresh of its belief.
         measurements: number of measurements in the graph.
+        size_site: what stands for its class in `log_size_covariance`.
+        log: what every view said.
     """
 
     number: int
@@ -37,6 +42,9 @@ class Landmark:
     contradicting: set[int] = field(default_factory=set)
     measurements: int = 0
     refreshed_at: int = 0
+    unsettled: bool = False
+    size_site: SizeSite = field(default_factory=lambda: SizeSite(np.zeros(3), 1e-3 * np.eye(3)))
+    log: ViewLog = field(default_factory=ViewLog)
 
     @property
     def half_axes(self) -> np.ndarray:
@@ -46,6 +54,7 @@ class Landmark:
     def count_from(self, other: Landmark) -> None:
         """Takes over the counts of a landmark merged into this one."""
         self.belief.absorb(other.belief)
+        self.log.absorb(other.log)
         self.first_seen, self.last_seen = min(self.first_seen, other.first_seen), max(self.last_seen, other.last_seen)
         self.supporting |= other.supporting
         self.contradicting = (self.contradicting | other.contradicting) - self.supporting

@@ -6,22 +6,27 @@ from collections import Counter
 
 import numpy as np
 
-from ...factors.appearance import ScoreEvidence
+from ...detectors.detections import Part
+from ...factors.evidence_model import EvidenceModel
+from ...factors.score_model import ScoreEvidence
 from ...factors.size_prior import ClassSizePriors
-from ..config import BeliefConfig, EvidenceModels, LifecycleConfig, TrackConfig
+from ..config import MapperConfig
+from ..proposals.few_views import Proposal, propose
 from .association import Assignment
-from .beliefs import Belief, initial_site, propagate
-from .evidence import Observer
+from .beliefs import Belief
+from .evidence import Observer, first_note
 from .landmarks import Landmark, volume_overlaps
-from .ledger import Look, Scores
 from .lifting import LiftedDetection
 from .outcomes import Outcome
 from .scene import Scene
+from .size_site import initial_site, propagate, size_evidence
 from .smoother import Smoother
-from .tracks import Track
+from .tracks import Observation, Track
 from .view import View
 
 ALWAYS_REFRESHED = 6  # measurements up to which a landmark's marginals are taken at every new one
+PROPOSED_FROM = 5  # observations from which a candidate's first volume is made
+CANDIDATE_SIZE_SIGMA = 0.25  # log units; a few boxes tell a candidate's half-axes this well
 REFRESH_EVERY = 3  # new measurements between two refreshes after that: a marginal costs 0.3-1 ms
 
 
@@ -34,13 +39,14 @@ class Lifecycle:
         smoother: Smoother,
         observer: Observer,
         priors: ClassSizePriors,
-        models: EvidenceModels,
-        configs: tuple[TrackConfig, BeliefConfig, LifecycleConfig],
+        model: EvidenceModel,
+        config: MapperConfig,
         outcomes: Counter[Outcome],
     ) -> None:
         self._scene, self._smoother, self._observer = scene, smoother, observer
-        self._priors, self._models, self._outcomes = priors, models, outcomes
-        self._tracks, self._beliefs, self._config = configs
+        self._priors, self._model, self._outcomes = priors, model, outcomes
+        self._tracks, self._beliefs, self._config = config.tracks, config.beliefs, config.lifecycle
+        self._evidence, self._offset = config.evidence, config.lifting.surface_offset
         self._refused: dict[tuple[int, int], int] = {}  # pairs that were not one thing -> their measurements then
 
     def start_tracks(
@@ -51,31 +57,34 @@ class Lifecycle:
         assignment: Assignment,
     ) -> None:
         """Detections that show nothing known become candidates."""
-        shown = zip(assignment.target, assignment.duplicate_of, strict=True)
-        for detection, evidence, (target, duplicate) in zip(detections, scores, shown, strict=True):
-            if target >= 0:
-                continue
-            if duplicate >= 0:
-                self._outcomes[Outcome.DUPLICATE] += 1
-                continue
-            covariance = view.covariance_to_world(detection.covariance())
-            belief = Belief(len(detection.scores), self._beliefs, self._models.rate, self._models.free_space)
-            track = Track(self._scene.next_track, view.to_world(detection.centre), covariance, belief)
-            self._scene.next_track += 1
-            weight = belief.views.weight(view.T_world_camera[:3, 3] - track.position)
-            track.observations.append((view.keyframe, detection, 1.0, weight))
-            track.belief.add_view(weight, 0.0, 0.0)
-            track.belief.add_scores(evidence, weight)
-            track.hits.add(view.keyframe)
-            track.first_seen = track.last_seen = view.frame.stamp
-            self._scene.tracks.append(track)
+        self._outcomes[Outcome.DUPLICATE] += int(np.count_nonzero(assignment.duplicate_of >= 0))
+        for leader in np.flatnonzero(assignment.starts_new()):
+            shown = [int(leader), *np.flatnonzero(assignment.same_as == leader).tolist()]
+            self._start_track(view, [detections[i] for i in shown], scores[leader])
             self._outcomes[Outcome.NEW_TRACK] += 1
+
+    def _start_track(self, view: View, shown: list[LiftedDetection], scores: ScoreEvidence) -> None:
+        best, evidence = shown[0], self._evidence
+        belief = Belief(len(best.scores), self._model, self._beliefs, evidence.presence, evidence.free_space)
+        covariance = view.covariance_to_world(best.covariance())
+        track = Track(self._scene.next_track, view.to_world(best.centre), covariance, belief)
+        self._scene.next_track += 1
+        place = view.T_world_camera[:3, 3] - track.position
+        weight = belief.weight(place)
+        # what hides a part of it is not known before there is a volume
+        belief.look(place, hits=1.0, scores=scores)
+        track.log.append(first_note(view, best, belief, weight))
+        everything = np.ones(len(Part))
+        track.observations.append(Observation(view.keyframe, view.T_world_camera, tuple(shown), everything, weight))
+        track.hits.add(view.keyframe)
+        track.first_seen = track.last_seen = view.frame.stamp
+        self._scene.tracks.append(track)
 
     def promote_and_drop(self) -> set[int]:
         """Ripe candidates become landmarks, lost ones go; returns the new landmarks' numbers."""
         kept, promoted = [], set()
         for track in self._scene.tracks:
-            track.belief.update()
+            track.belief.update(self._size_evidence(track))
             if track.is_ripe(self._tracks):
                 promoted.add(self._promote(track))
             elif track.is_lost(self._tracks):
@@ -88,33 +97,62 @@ class Lifecycle:
         return promoted
 
     def _promote(self, track: Track) -> int:
+        proposal = self._propose(track)
+        stamps = track.first_seen, track.last_seen
+        landmark = self.add_landmark(proposal.position, proposal.log_size, track.covariance, track.belief, stamps)
+        landmark.supporting, landmark.contradicting, landmark.log = track.hits, track.misses, track.log
+        for seen in track.observations:
+            self._observer.record_scores(landmark.number, seen)
+            self._observer.measure(landmark, seen)
+        self._outcomes[Outcome.PROMOTED] += 1
+        return landmark.number
+
+    def add_landmark(
+        self,
+        position: np.ndarray,
+        log_size: np.ndarray,
+        covariance: np.ndarray,
+        belief: Belief,
+        stamps: tuple[float, float],
+    ) -> Landmark:
+        """A new landmark without measurements.
+
+        Args:
+            position, covariance: (3,), (3, 3) world, metres.
+            log_size: (3,) log half-axes, upright frame.
+            belief: what is known of its class and existence.
+            stamps: when it was seen first and last, seconds.
+        """
         number = self._scene.next_landmark
         self._scene.next_landmark += 1
-        landmark = Landmark(
-            number, track.belief, track.position, track.log_size, track.first_seen, track.last_seen, track.covariance
-        )
-        landmark.supporting, landmark.contradicting = track.hits, track.misses
-        known = track.belief.posterior
-        if not self._beliefs.size_coupling:
-            known = np.eye(len(known))[0]
-        site = initial_site(self._priors, known)
-        self._smoother.add_landmark(number, track.position, track.log_size, site)
-        for keyframe, detection, visible, weight in track.observations:
-            scores = np.asarray(detection.scores, dtype=np.float32)
-            self._smoother.add(Scores(keyframe, number, scores, 1.0 - visible, weight))
-            self._observer.measure(landmark, keyframe, detection, visible, weight)
-        belief = track.belief
-        self._smoother.add(Look(track.observations[-1][0], number, belief.hits, belief.misses, belief.free))
+        landmark = Landmark(number, belief, position, log_size, *stamps, covariance)
+        known = belief.posterior if self._beliefs.size_coupling else np.eye(len(belief.posterior))[0]
+        self._smoother.add_landmark(number, position, log_size, initial_site(self._priors, known))
         self._scene.landmarks[number] = landmark
-        self._outcomes[Outcome.PROMOTED] += 1
-        return number
+        return landmark
+
+    def _propose(self, track: Track) -> Proposal:
+        """Where the candidate is and how large, from its latest observations."""
+        latest = track.observations[-PROPOSED_FROM:]
+        seen = [(one.T_world_camera, detection) for one in latest for detection in one.detections]
+        smoother = self._smoother
+        posterior = track.belief.class_posterior()
+        return propose(seen, smoother.intrinsics, smoother.R_world_upright, self._priors, posterior, self._offset)
+
+    def _size_evidence(self, track: Track) -> np.ndarray:
+        """(K + 1,) what the boxes of a candidate say about its class by its size."""
+        if not self._beliefs.size_coupling:
+            return track.belief.log_z
+        information = np.eye(3) / CANDIDATE_SIZE_SIGMA**2
+        return size_evidence(information, information @ track.log_size, self._priors, self._beliefs.size_outlier)
 
     def refresh(self, touched: set[int]) -> None:
         """Landmarks follow the graph; class and size of the touched ones are brought to agree (one EP step each)."""
         for number, landmark in self._scene.landmarks.items():
             landmark.position, landmark.log_size = self._smoother.position(number), self._smoother.log_size(number)
             new = landmark.measurements - landmark.refreshed_at
-            if new and (landmark.measurements <= ALWAYS_REFRESHED or new >= REFRESH_EVERY):
+            due = new and (landmark.measurements <= ALWAYS_REFRESHED or new >= REFRESH_EVERY)
+            if due or landmark.unsettled:
                 self.refresh_fully(landmark)
             elif number in touched:
                 landmark.belief.update()
@@ -125,15 +163,17 @@ class Lifecycle:
         landmark.position, landmark.log_size = smoother.position(number), smoother.log_size(number)
         covariance, site = smoother.log_size_covariance(number), smoother.sites[number]
         landmark.covariance = smoother.position_covariance(number)
-        landmark.log_size_covariance = covariance
+        landmark.log_size_covariance, landmark.size_site = covariance, site
         landmark.refreshed_at = landmark.measurements
         if not self._beliefs.size_coupling:
             landmark.belief.update()
             return
-        belief, outlier = landmark.belief.log_belief(), self._beliefs.size_outlier
-        result = propagate(landmark.log_size, covariance, site, belief, self._priors, outlier)
+        numbers = self._beliefs.size_outlier, self._model.existence.weight_size
+        belief = landmark.belief.log_belief()
+        result = propagate(landmark.log_size, covariance, site, belief, self._priors, *numbers)
         landmark.belief.update(result.log_z)
-        if site.distance(result.site) > self._beliefs.site_tolerance:
+        landmark.unsettled = site.distance(result.site) > self._beliefs.site_tolerance
+        if landmark.unsettled:
             smoother.set_site(number, result.site)
 
     def bring_up_to_date(self) -> None:
@@ -148,6 +188,7 @@ class Lifecycle:
             landmark.position, landmark.log_size = smoother.position(number), smoother.log_size(number)
             landmark.covariance = smoother.position_covariance(number)
             landmark.log_size_covariance = smoother.log_size_covariance(number)
+            landmark.size_site = smoother.sites[number]
             landmark.belief.update()
 
     def merge(self) -> None:

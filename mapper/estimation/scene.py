@@ -46,8 +46,9 @@ class Scene:
         visibility = measure_visibility(view.frame.depth, k, *camera, positions, log_sizes)
         if not occlusion:
             none = np.zeros_like(visibility.occluded)
-            visibility = replace(visibility, occluded=none, agreeing=none, free=none, missing=none)
+            ratios = {"occluded": none, "agreeing": none, "free": none, "missing": none, "depth_log_ratio": none}
+            visibility = replace(visibility, **ratios)
         xyxy, _ = project_volumes(*camera, positions, log_sizes, k)
         clipped = np.clip(xyxy, -0.5, np.array([k.width, k.height, k.width, k.height]) - 0.5)
-        visible = visibility.visible[:, WHOLE]
-        return Targets(positions, covariances, log_sizes, clipped, visible), visibility
+        parts = visibility.visible
+        return Targets(positions, covariances, log_sizes, clipped, parts[:, WHOLE], parts, xyxy), visibility

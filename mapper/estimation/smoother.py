@@ -13,9 +13,9 @@ from ...datasets.frame import Intrinsics
 from ...factors.odometry import gauge_prior, pose3
 from ..config import SmootherConfig
 from ..map.upright import upright_rotation
-from .beliefs import SizeSite
 from .ledger import Box, DepthCentre, Gauge, Ledger, Merge, Motion, NewLandmark, Record, Retire, Site, UpPrior
 from .record_factors import UP, FactorContext, record_factors, site_factor
+from .size_site import SizeSite
 
 REBUILD_STEPS = 10  # at most, Gauss-Newton steps after a rebuild, until nothing moves by more than the thresholds
 SNAPSHOT_EVERY = 20  # updates between copies of the estimate from which a rebuild starts
@@ -27,7 +27,7 @@ class Smoother:
     """Keeps the graph of a ledger solved. Measurements queue up until `update`."""
 
     def __init__(self, config: SmootherConfig, intrinsics: Intrinsics, upright_tolerance: float = 0.026) -> None:
-        self._config, self._intrinsics, self._tolerance = config, intrinsics, upright_tolerance
+        self._config, self.intrinsics, self._tolerance = config, intrinsics, upright_tolerance
         self.ledger = Ledger()
         self.sites: dict[int, SizeSite] = {}
         self.keyframes = 0
@@ -314,7 +314,7 @@ class Smoother:
             self._queue[("record", number)] = factors
 
     def _factors(self, record: Record) -> list[gtsam.NonlinearFactor]:
-        context = FactorContext(self._config, self._intrinsics, self.R_world_upright, self.owner)
+        context = FactorContext(self._config, self.intrinsics, self.R_world_upright, self.owner)
         return record_factors(record, context)
 
     def _drop(self, owner: Owner) -> None:

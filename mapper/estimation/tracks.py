@@ -2,12 +2,46 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from filterpy.kalman import KalmanFilter
 
 from ..config import TrackConfig
 from .beliefs import Belief
 from .lifting import LiftedDetection
+from .view_log import ViewLog
+
+MIN_SHARE = 0.1  # what shows less than this still measures as much
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observation:
+    """How one keyframe showed an object.
+
+    Attributes:
+        keyframe: its number.
+        T_world_camera: (4, 4) its pose as known then.
+        detections: at most one a template, the one that weighs most first.
+        visible: (5,) visible share of every part.
+        weight: how new the view was, 0 to 1.
+    """
+
+    keyframe: int
+    T_world_camera: np.ndarray
+    detections: tuple[LiftedDetection, ...]
+    visible: np.ndarray
+    weight: float
+
+    @property
+    def shares(self) -> np.ndarray:
+        """(n,) share of one full measurement's information that each detection brings.
+
+        Templates that fire together see the same pixels: their shares are those of Explicit Occlusion, equation (4),
+        and of a half hidden object half the pixels vote.
+        """
+        visible = np.maximum(self.visible[[d.part for d in self.detections]], MIN_SHARE)
+        return visible * visible / visible.sum()
 
 
 class Track:
@@ -17,7 +51,8 @@ class Track:
         number: of the track.
         belief: class and existence so far.
         hits, misses: numbers of the keyframes in which it was detected, and should have been but was not.
-        observations: (keyframe, detection, visible share, view weight) of every hit.
+        observations: the keyframes that detected it.
+        log: what every view said.
     """
 
     def __init__(self, number: int, position: np.ndarray, covariance: np.ndarray, belief: Belief) -> None:
@@ -26,10 +61,16 @@ class Track:
         self.misses: set[int] = set()
         self.misses_in_a_row = 0
         self.first_seen = self.last_seen = 0.0
-        self.observations: list[tuple[int, LiftedDetection, float, float]] = []
+        self.observations: list[Observation] = []
+        self.log = ViewLog()
         self._filter = KalmanFilter(dim_x=3, dim_z=3)
         self._filter.x, self._filter.P = position.copy(), covariance.copy()
         self._filter.F = self._filter.H = np.eye(3)
+
+    def see(self, seen: Observation, position: np.ndarray, covariance: np.ndarray) -> None:
+        """Another keyframe showed it, at (3,) world with (3, 3) covariance."""
+        self.correct(position, covariance)
+        self.observations.append(seen)
 
     def predict(self, config: TrackConfig) -> None:
         """One keyframe passes: odometry drift against the map widens the position."""
@@ -53,11 +94,14 @@ class Track:
     @property
     def log_size(self) -> np.ndarray:
         """(3,) log half-axes in the upright frame: the median of the boxes; both horizontal axes alike."""
-        width, _, height = np.median(np.log([d.half_extents for _, d, _, _ in self.observations]), axis=0)
+        half_extents = [d.half_extents for seen in self.observations for d in seen.detections]
+        width, _, height = np.median(np.log(half_extents), axis=0)
         return np.array([width, width, height])
 
     def is_ripe(self, config: TrackConfig) -> bool:
         """Whether it has earned a landmark."""
+        if self.belief.is_object >= config.min_existence:
+            return True
         hits, misses = len(self.hits), len(self.misses)
         return hits >= config.min_hits and hits >= config.min_hit_rate * (hits + misses)
 

@@ -136,7 +136,7 @@ def test_numerical_noise_in_the_cavity_does_not_matter():
     ):
         np.testing.assert_allclose(noisy, clean, atol=1e-5)
     log_z, _, _ = priors.log_evidence(np.eye(3) * 1e8, 1e8 * priors.mean[1])
-    assert np.isfinite(log_z).all() and log_z[1:].argmax() == 0
+    assert np.isfinite(log_z).all() and log_z[1:-1].argmax() == 0
 
 
 def test_size_tells_a_mug_from_a_chair():
@@ -159,13 +159,13 @@ def test_coco_and_table_top_classes_are_known():
     priors = load_size_priors(COCO_80)
     assert {name for name, known in zip(COCO_80, priors.known, strict=True) if not known} == RARELY_INDOORS
     assert load_size_priors(TABLE_TOP).known.all()
-    assert priors.mean.shape == (81, 3) and priors.covariance.shape == (81, 3, 3)
+    assert priors.mean.shape == (82, 3) and priors.covariance.shape == (82, 3, 3)
     assert np.linalg.eigvalsh(priors.covariance).min() > 0.0
 
 
 def test_not_an_object_is_wide_and_in_the_middle():
     priors = load_size_priors(["bottle", "chair"])
-    np.testing.assert_allclose(priors.mean[0], priors.mean[1:].mean(axis=0))
+    np.testing.assert_allclose(priors.mean[0], priors.mean[1:3].mean(axis=0))
     np.testing.assert_allclose(priors.covariance[0], WIDE_SIGMA**2 * np.eye(3))
 
 
@@ -177,7 +177,21 @@ def test_an_unknown_class_is_like_no_object():
     assert log_z[2] == pytest.approx(log_z[0])
     nothing_known = load_size_priors(["gadget"])
     assert np.isfinite(nothing_known.mean).all() and not nothing_known.known.any()
-    assert load_size_priors([]).mean.shape == (1, 3)
+    assert load_size_priors([]).mean.shape == (2, 3)
+
+
+def test_anything_is_wide_whatever_no_object_is():
+    """The last row stays the wide Gaussian where the size of what is no object is known."""
+    known = np.array([-3.0, -3.0, -4.0]), 0.2 * np.eye(3)
+    plain, learned = load_size_priors(["bottle", "gadget"]), load_size_priors(["bottle", "gadget"], background=known)
+    assert len(plain.mean) == len(learned.mean) == 4
+    for priors in (plain, learned):
+        np.testing.assert_array_equal(priors.mean[-1], plain.mean[0])
+        np.testing.assert_array_equal(priors.covariance[-1], WIDE_SIGMA**2 * np.eye(3))
+        np.testing.assert_array_equal(priors.mean[2], priors.mean[0])  # of an unknown class size says nothing
+    np.testing.assert_array_equal(learned.mean[0], known[0])
+    np.testing.assert_array_equal(learned.covariance[0], known[1])
+    np.testing.assert_array_equal(learned.mean[1], plain.mean[1])
 
 
 def test_aliases_and_spelling():

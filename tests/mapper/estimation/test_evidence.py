@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from thingmap.factors.appearance import AppearanceModel
 from thingmap.mapper.estimation.association import Assignment
 from thingmap.mapper.estimation.evidence import FIRST_MEASUREMENTS, score_evidence
 from thingmap.mapper.estimation.ledger import Box, DepthCentre, Look, Scores
@@ -48,9 +47,9 @@ def records(stage, kind) -> list:
 def test_scores_alone_are_read_as_if_nothing_hid_the_object(stage, cup):
     view = stage.view(0.0, cup)
     lifted, _ = lift(stage.detect(view, [cup]), view.frame, stage.config.lifting)
-    (evidence,) = score_evidence(lifted, stage.models.appearance)
-    np.testing.assert_array_equal(evidence.own, AppearanceModel().evidence(np.array(CUP), 0.0).own)
-    assert score_evidence([], stage.models.appearance) == []
+    (evidence,) = score_evidence(lifted, stage.model)
+    np.testing.assert_array_equal(evidence.own, stage.model.scores.evidence(np.array(CUP), 0.0).own)
+    assert score_evidence([], stage.model) == []
 
 
 def test_a_hit_supports_and_measures(stage, landmark, cup):
@@ -65,20 +64,22 @@ def test_a_hit_supports_and_measures(stage, landmark, cup):
 
 
 def test_what_was_said_is_in_the_ledger(stage, landmark, cup):
+    before = landmark.belief.evidence
     view = stage.show(0.0, cup)
     look, scores = records(stage, Look)[-1], records(stage, Scores)[-1]
     centre, box = records(stage, DepthCentre)[-1], records(stage, Box)[-1]
     assert {r.keyframe for r in (look, scores, centre, box)} == {view.keyframe}
     assert {r.landmark for r in (look, scores, centre, box)} == {1}
-    assert (look.hits, look.misses) == (pytest.approx(1.0), 0.0) and scores.weight == look.hits
+    assert (look.hits, look.misses) == (pytest.approx(1.0), 0.0) and scores.weight == pytest.approx(1.0)
     np.testing.assert_allclose(scores.scores, CUP, rtol=1e-6)
     np.testing.assert_allclose(stage.smoother.position(1) @ [1, 0, 0], 0.0, atol=0.02)
     lifted, _ = lift(stage.detect(view, [cup]), view.frame, stage.config.lifting)
     np.testing.assert_allclose(box.xyxy, lifted[0].xyxy)
     np.testing.assert_allclose(centre.centre, lifted[0].centre)
-    total = np.sum([(r.hits, r.misses, r.free) for r in records(stage, Look)], axis=0)
-    belief = landmark.belief
-    np.testing.assert_allclose(total, [belief.hits, belief.misses, belief.free])
+    after = landmark.belief.evidence  # the direction is new, so all of the look is
+    said = [getattr(after, name)[0] - getattr(before, name)[0] for name in ("hits", "misses", "free", "depth")]
+    np.testing.assert_allclose([look.hits, look.misses, look.free, look.depth], said, atol=1e-6)
+    np.testing.assert_allclose(look.visible, 1.0, atol=0.05)
 
 
 def test_the_same_view_again_says_little_and_is_not_measured(stage, landmark, cup):

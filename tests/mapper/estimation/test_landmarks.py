@@ -7,9 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thingmap.factors.free_space import FreeSpace
-from thingmap.factors.missed import DetectionRate
-from thingmap.mapper.config import BeliefConfig
+from thingmap.factors.evidence_model import generic_evidence_model
 from thingmap.mapper.estimation.beliefs import Belief
 from thingmap.mapper.estimation.landmarks import Landmark, volume_overlaps
 
@@ -17,7 +15,7 @@ TURNED = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # a qua
 
 
 def make(number: int, position=(0.0, 0.0, 0.0), half_axes=(0.1, 0.2, 0.3)) -> Landmark:
-    belief = Belief(2, BeliefConfig(), DetectionRate(), FreeSpace())
+    belief = Belief(2, generic_evidence_model())
     return Landmark(number, belief, np.array(position, dtype=float), np.log(half_axes), 1.0, 2.0)
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from thingmap.mapper.estimation.beliefs import propagate
+from thingmap.mapper.config import MapperConfig, TrackConfig
 from thingmap.mapper.estimation.landmarks import volume_overlaps
-from thingmap.mapper.estimation.ledger import Ledger, Look, Merge, NewLandmark, Retire, Scores
+from thingmap.mapper.estimation.ledger import DepthCentre, Ledger, Look, Merge, NewLandmark, Retire, Scores
 from thingmap.mapper.estimation.outcomes import Outcome
+from thingmap.mapper.estimation.size_site import propagate
 from thingmap.mapper.estimation.smoother import Smoother
 
 CUP, BOWL, NOTHING = (0.6, 0.1, 0.02), (0.1, 0.6, 0.02), (0.12, 0.1, 0.02)
@@ -36,7 +37,8 @@ def test_a_detection_starts_a_candidate(tools):
     (track,) = stage.scene.tracks
     assert track.number == 1 and track.hits == {0} and not track.misses
     assert track.first_seen == track.last_seen == view.frame.stamp
-    assert track.belief.hits == 1.0 and track.belief.own[0] > track.belief.own[1]
+    own = track.belief.evidence.own[0]
+    assert track.belief.hits == 1.0 and own[0] > own[1]
     np.testing.assert_allclose(track.position, [0.0, 0.0, 0.0], atol=0.1)
     assert stage.outcomes[Outcome.NEW_TRACK] == 1
 
@@ -54,13 +56,22 @@ def test_the_third_hit_makes_a_landmark(tools):
     np.testing.assert_allclose(landmark.half_axes[[0, 2]], 0.1, rtol=0.1)
 
 
+def test_what_is_probably_an_object_is_a_landmark_at_once(tools):
+    """Unless only hits are to decide, one good look is enough; a doubtful one is not."""
+    quick = MapperConfig(tracks=TrackConfig(min_existence=0.6))
+    for scores, landmarks in ((CUP, 1), (NOTHING, 0)):
+        stage = follow(tools.Stage(quick), cup(tools, scores=scores), places=(0.0,))
+        assert len(stage.scene.landmarks) == landmarks and len(stage.scene.tracks) == 1 - landmarks
+    (landmark,) = follow(tools.Stage(quick), cup(tools), places=(0.0,)).scene.landmarks.values()
+    assert landmark.measurements == 1 and landmark.supporting == {0}
+
+
 def test_the_past_of_a_candidate_is_in_the_ledger(tools):
     stage = follow(tools.Stage(), cup(tools), places=(-0.4, -0.2, 0.0))
     kinds = [type(record) for record in stage.smoother.ledger]
-    assert kinds.count(NewLandmark) == 1 and kinds.count(Scores) == 3 and kinds.count(Look) == 1
-    belief = stage.scene.landmarks[1].belief
-    (look,) = [r for r in stage.smoother.ledger if isinstance(r, Look)]
-    assert (look.hits, look.misses, look.free) == (belief.hits, belief.misses, belief.free)
+    assert kinds.count(NewLandmark) == 1 and kinds.count(Scores) == 3 and kinds.count(DepthCentre) == 3
+    stage.show(0.2, cup(tools))
+    assert [r.keyframe for r in stage.smoother.ledger if isinstance(r, Look)] == [3]  # looks are of landmarks
 
 
 def test_numbers_are_never_used_twice(tools):
@@ -156,13 +167,14 @@ def test_two_landmarks_at_one_place_become_one(tools):
     a, b = stage.scene.landmarks[1], stage.scene.landmarks[2]
     places = a.position[0], b.position[0]
     hits, measurements, seen = (
-        a.belief.hits + b.belief.hits,
+        (a.belief.hits, b.belief.hits),
         a.measurements + b.measurements,
         a.supporting | b.supporting,
     )
     stage.lifecycle.merge()
     assert list(stage.scene.landmarks) == [1] and stage.smoother.owner(2) == 1
-    assert (a.belief.hits, a.measurements, a.supporting) == (pytest.approx(hits), measurements, seen)
+    assert (a.measurements, a.supporting) == (measurements, seen)
+    assert max(hits) < a.belief.hits < sum(hits)  # both were seen from about the same places
     stage.smoother.update()
     stage.lifecycle.refresh(set())
     assert places[0] + 0.005 < stage.smoother.position(1)[0] < places[1] - 0.005
@@ -226,14 +238,16 @@ def test_retired_landmarks_leave_the_graph_and_stay_known(tools):
 def test_nothing_retires_before_it_was_looked_at_often_enough(tools):
     stage = follow(tools.Stage(), cup(tools), places=(-0.4, -0.2, 0.0))
     landmark = stage.scene.landmarks[1]
-    belief = landmark.belief
-    belief.free = -50.0
-    belief.hits = stage.config.lifecycle.retire_views - 0.5
+    belief, views = landmark.belief, stage.config.lifecycle.retire_views
+    assert belief.effective_views < views - 0.1
+    belief.look(np.array([0.0, 0.0, 1.0]), free=-50.0, seen=1.0)
     belief.update()
     assert belief.existence < stage.config.lifecycle.retire_below
     stage.lifecycle.retire()
     assert list(stage.scene.landmarks) == [1]
-    belief.misses = 1.0
+    for side in (-1.0, 1.0):
+        belief.look(np.array([side, 0.0, 0.0]), misses=1.0)
+    belief.update()
     stage.lifecycle.retire()
     assert list(stage.scene.landmarks) == []
 

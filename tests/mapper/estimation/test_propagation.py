@@ -14,8 +14,8 @@ from scipy.special import logsumexp, softmax
 from scipy.stats import multivariate_normal
 
 from thingmap.factors.size_prior import ClassSizePriors
-from thingmap.mapper.estimation.beliefs import Refreshed, SizeSite, initial_site, propagate
 from thingmap.mapper.estimation.record_factors import site_factor
+from thingmap.mapper.estimation.size_site import Refreshed, SizeSite, initial_site, propagate
 
 MUG = np.log([0.05, 0.05, 0.06])
 
@@ -23,10 +23,10 @@ MUG = np.log([0.05, 0.05, 0.06])
 def random_problem(seed: int, classes: int) -> tuple[ClassSizePriors, np.ndarray]:
     """Size priors with full covariances about a mug's size, and (K + 1,) log beliefs from scores."""
     rng = np.random.default_rng(seed)
-    means = MUG + np.vstack([np.zeros(3), rng.normal(0.0, 0.35, (classes, 3))])
-    roots = rng.normal(0.0, 0.12, (classes + 1, 3, 3)) + 0.12 * np.eye(3)
+    means = MUG + np.vstack([np.zeros(3), rng.normal(0.0, 0.35, (classes, 3)), [0.3, -0.2, 0.1]])
+    roots = rng.normal(0.0, 0.12, (classes + 2, 3, 3)) + 0.12 * np.eye(3)
     covariances = roots @ roots.transpose(0, 2, 1) + 0.01 * np.eye(3)
-    covariances[0] = np.eye(3)  # "not an object": wide
+    covariances[0], covariances[-1] = 0.6**2 * np.eye(3), np.eye(3)  # "not an object", and anything: wide
     priors = ClassSizePriors(tuple("abcdefgh"[:classes]), means, covariances, np.ones(classes, bool))
     return priors, np.log(rng.dirichlet(np.full(classes + 1, 2.0)))
 
@@ -36,10 +36,10 @@ def log_normal(x: np.ndarray, mean: np.ndarray, covariance: np.ndarray) -> np.nd
 
 
 def components(k: int, outlier: float) -> list[tuple[int, float]]:
-    """The Gaussians that class k's size follows, with log weights: its own, or the wide one for outliers."""
+    """Rows of the Gaussians that class k's size follows, with log weights: its own, or the last one for outliers."""
     if k == 0 or outlier == 0.0:
         return [(k, 0.0)]
-    return [(k, np.log1p(-outlier)), (0, np.log(outlier))]
+    return [(k, np.log1p(-outlier)), (-1, np.log(outlier))]
 
 
 def enumerate_exactly(
@@ -51,7 +51,7 @@ def enumerate_exactly(
     """
     count = len(beliefs)
     rows: list[tuple[tuple[int, ...], float, np.ndarray]] = []
-    for classes in itertools.product(range(len(priors.mean)), repeat=count):
+    for classes in itertools.product(range(len(priors.mean) - 1), repeat=count):
         belief = float(sum(beliefs[i][k] for i, k in enumerate(classes)))
         for parts in itertools.product(*(components(k, outlier) for k in classes)):
             mean = np.concatenate([priors.mean[c] for c, _ in parts])
@@ -62,7 +62,7 @@ def enumerate_exactly(
             size = mean + prior @ np.linalg.solve(prior + noise, z - mean)
             rows.append((classes, belief + log_z + sum(w for _, w in parts), size))
     weight = softmax([w for _, w, _ in rows])
-    posterior = np.zeros((count, len(priors.mean)))
+    posterior = np.zeros((count, len(priors.mean) - 1))
     for (classes, _, _), w in zip(rows, weight, strict=True):
         posterior[np.arange(count), classes] += w
     return posterior, (weight @ np.array([size for _, _, size in rows])).reshape(count, 3)
@@ -132,7 +132,8 @@ def test_one_object_against_numerical_integration(outlier):
     axes = [z[i] + np.linspace(-6.0, 6.0, 49) * np.sqrt(noise[i, i]) for i in range(3)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     own = np.array([log_normal(grid, m, C) for m, C in zip(priors.mean, priors.covariance, strict=True)])
-    density = np.array([logsumexp([own[c] + w for c, w in components(k, outlier)], axis=0) for k in range(len(own))])
+    kinds = range(len(own) - 1)
+    density = np.array([logsumexp([own[c] + w for c, w in components(k, outlier)], axis=0) for k in kinds])
     joint = density + belief[:, None] + log_normal(grid, z, noise)[None]
     weight = np.exp(joint - joint.max())
     weight /= weight.sum()
@@ -166,7 +167,8 @@ def test_what_one_object_is_tells_about_the_other():
     """Both boxes look 0.3 log units too large. The first is sure to be small, so the camera erred, for both."""
     small, large = np.full(3, -3.0), np.full(3, -2.7)
     priors = ClassSizePriors(
-        ("small", "large"), np.array([small, small, large]), np.array([4.0, 0.0025, 0.0025])[:, None, None] * np.eye(3),
+        ("small", "large"), np.array([small, small, large, small]),
+        np.array([4.0, 0.0025, 0.0025, 4.0])[:, None, None] * np.eye(3),
         np.ones(2, bool),
     )  # fmt: skip
     sure, open_ = np.log([1e-6, 1.0, 1e-6]), np.log([1e-6, 0.5, 0.5])
@@ -218,9 +220,9 @@ def test_the_site_gives_the_graph_the_moments_of_the_mixture_where_it_can(seed):
 
 def test_a_site_stays_near_the_size_where_the_classes_are_two_peaks_apart():
     """The mixture is wider than the cavity: no Gaussian site exists, and what stands in must not pull for ever."""
-    means = np.array([[-2.0] * 3, [-2.6] * 3, [-1.4] * 3])
+    means = np.array([[-2.0] * 3, [-2.6] * 3, [-1.4] * 3, [-2.0] * 3])
     priors = ClassSizePriors(
-        ("small", "large"), means, np.array([1.0, 0.01, 0.01])[:, None, None] * np.eye(3), np.ones(2, bool)
+        ("small", "large"), means, np.array([1.0, 0.01, 0.01, 1.0])[:, None, None] * np.eye(3), np.ones(2, bool)
     )
     information = np.eye(3) / 0.5**2
     result = propagate(
@@ -244,13 +246,13 @@ def test_unknown_sizes_leave_the_classes_to_the_scores(tools):
 @settings(max_examples=30, deadline=None)
 def test_the_order_of_the_classes_does_not_matter(seed, order):
     priors, belief = random_problem(seed, 4)
-    rows = np.array([0, *(k + 1 for k in order)])
+    rows = np.array([0, *(k + 1 for k in order), 5])
     names = tuple(priors.classes[k] for k in order)
     shuffled = ClassSizePriors(names, priors.mean[rows], priors.covariance[rows], priors.known)
     site, z = SizeSite(MUG, np.eye(3)), MUG + 0.2
     one = propagate(z, 0.02 * np.eye(3), site, belief, priors, 0.1)
-    other = propagate(z, 0.02 * np.eye(3), site, belief[rows], shuffled, 0.1)
-    np.testing.assert_allclose(other.posterior, one.posterior[rows], atol=1e-12)
+    other = propagate(z, 0.02 * np.eye(3), site, belief[rows[:-1]], shuffled, 0.1)
+    np.testing.assert_allclose(other.posterior, one.posterior[rows[:-1]], atol=1e-12)
     np.testing.assert_allclose(other.mean, one.mean, atol=1e-12)
 
 

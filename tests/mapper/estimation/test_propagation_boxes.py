@@ -17,7 +17,7 @@ from gtsam.symbol_shorthand import S
 from scipy.special import softmax
 
 from thingmap.factors.size_prior import ClassSizePriors
-from thingmap.mapper.estimation.beliefs import Refreshed, initial_site, propagate
+from thingmap.mapper.estimation.size_site import Refreshed, initial_site, propagate
 
 HALF_AXES = (0.1, 0.15, 0.2)
 PLACES = ((0.0, 0.0, 0.0), (0.3, -0.5, 0.1))
@@ -64,7 +64,7 @@ def propagate_to_the_end(room, priors: ClassSizePriors, beliefs: list[np.ndarray
 def enumerate_graph(tools, room, priors: ClassSizePriors, beliefs: list[np.ndarray], outlier: float):
     """(2, K + 1) class posteriors and (2, 3) mean log sizes by Laplace's evidence of every assignment."""
     factors, start = tools.ledger_factors(room.smoother), tools.estimate(room.smoother)
-    kinds = range(len(priors.mean))
+    kinds = range(len(priors.mean) - 1)  # what is anything has the size of what is no object
     evidence, sizes = np.empty((len(kinds), len(kinds))), np.empty((len(kinds), len(kinds), 2, 3))
     for pair in itertools.product(kinds, repeat=2):
         own = [

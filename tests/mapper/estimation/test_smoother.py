@@ -8,8 +8,8 @@ import pytest
 from gtsam.symbol_shorthand import L, S, X
 
 from thingmap.mapper.config import SmootherConfig
-from thingmap.mapper.estimation.beliefs import SizeSite
 from thingmap.mapper.estimation.ledger import Box, DepthCentre, Look, Retire, Scores, Visual
+from thingmap.mapper.estimation.size_site import SizeSite
 from thingmap.mapper.estimation.smoother import Smoother
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from thingmap.factors.volume import project_volumes
 from thingmap.mapper.config import SmootherConfig
-from thingmap.mapper.estimation.beliefs import SizeSite
 from thingmap.mapper.estimation.ledger import Box, DepthCentre, Ledger, Up
+from thingmap.mapper.estimation.size_site import SizeSite
 from thingmap.mapper.estimation.smoother import Smoother
 
 HALF_AXES = (0.1, 0.15, 0.2)

@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from thingmap.factors.free_space import FreeSpace
-from thingmap.factors.missed import DetectionRate
-from thingmap.mapper.config import BeliefConfig, TrackConfig
+from thingmap.factors.evidence_model import generic_evidence_model
+from thingmap.mapper.config import TrackConfig
 from thingmap.mapper.estimation.beliefs import Belief
 from thingmap.mapper.estimation.lifting import LiftedDetection
-from thingmap.mapper.estimation.tracks import Track
+from thingmap.mapper.estimation.tracks import MIN_SHARE, Observation, Track
 
 CONFIG = TrackConfig()
 
 
 def make(position=(0.0, 0.0, 1.0), sigma: float = 0.1) -> Track:
-    belief = Belief(2, BeliefConfig(), DetectionRate(), FreeSpace())
+    belief = Belief(2, generic_evidence_model())
     return Track(1, np.array(position), sigma**2 * np.eye(3), belief)
 
 
-def observation(keyframe: int, half_extents) -> tuple[int, LiftedDetection, float, float]:
+def observation(keyframe: int, half_extents) -> Observation:
     detection = LiftedDetection(
         np.zeros(2), np.zeros(4), np.ones(4, bool), 1.0, np.array([0.0, 0.0, 1.0]), 0.1, 0.1, np.array(half_extents)
     )
-    return keyframe, detection, 1.0, 1.0
+    return Observation(keyframe, np.eye(4), (detection,), np.ones(5), 1.0)
 
 
 def test_measurements_average_by_their_information():
@@ -77,6 +78,7 @@ def test_the_size_is_the_median_of_the_boxes():
 )
 def test_ripe_by_hits_and_their_rate(hits, misses, ripe):
     track = make()
+    track.belief.posterior = np.array([0.9, 0.05, 0.05])
     track.hits, track.misses = set(range(hits)), set(range(100, 100 + misses))
     assert track.is_ripe(CONFIG) is ripe
 
@@ -87,3 +89,21 @@ def test_lost_after_misses_in_a_row():
     assert not track.is_lost(CONFIG)
     track.misses_in_a_row += 1
     assert track.is_lost(CONFIG)
+
+
+def test_ripe_as_soon_as_it_is_likely_enough():
+    track = make()
+    for likely, ripe in ((CONFIG.min_existence - 0.01, False), (CONFIG.min_existence + 0.01, True)):
+        track.belief.posterior = np.array([1.0 - likely, likely, 0.0])
+        assert track.is_ripe(CONFIG) is ripe
+
+
+def test_templates_that_fire_together_share_one_measurement():
+    """Whole, top and left of something of which 0.6, 0.9 and 0.3 show: 0.6, 0.9 and 0.3 of 1.8, of what shows."""
+    detections = tuple(replace(observation(0, (0.1,) * 3).detections[0], part=part) for part in (0, 1, 3))
+    seen = Observation(0, np.eye(4), detections, np.array([0.6, 0.9, 0.2, 0.3, 0.0]), 1.0)
+    np.testing.assert_allclose(seen.shares, np.array([0.36, 0.81, 0.09]) / 1.8)
+    alone = Observation(0, np.eye(4), detections[:1], np.array([0.5, 0.0, 0.0, 0.0, 0.0]), 1.0)
+    np.testing.assert_allclose(alone.shares, [0.5])
+    hardly = Observation(0, np.eye(4), detections[:1], np.zeros(5), 1.0)
+    np.testing.assert_allclose(hardly.shares, [MIN_SHARE])
