@@ -43,7 +43,8 @@ class SnapshotWriter:
         stamps, poses = self._mapper.trajectory()
         name = f"{frames:06d}.json"
         self._folder.snapshot_folder.mkdir(exist_ok=True)
-        self._mapper.object_map(include_doubtful=True).save(self._folder.snapshot_folder / name, include_doubtful=True)
+        object_map = self._mapper.object_map(include_doubtful=True)
+        object_map.save(self._folder.snapshot_folder / name, include_doubtful=True, evidence=False)
         pose = np.round(poses[-1], 9).tolist()
         self._written.append({"frames": frames, "file": name, "stamp": float(stamps[-1]), "T_world_camera": pose})
         self._write_index()

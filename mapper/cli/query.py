@@ -25,7 +25,10 @@ def query(
     min_probability: Annotated[
         float, typer.Option(min=0.0, max=1.0, metavar="P", help="Leave out what is less probably a LABEL.")
     ] = 0.05,
-    as_json: Annotated[bool, typer.Option("--json", help="Answer in JSON.")] = False,
+    why: Annotated[
+        bool, typer.Option("--why", help="Say after each answer which views spoke for it, and which against.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Answer in JSON, with --why every view on record.")] = False,
 ) -> None:
     """Find the things that may be a LABEL.
 
@@ -33,7 +36,7 @@ def query(
     """
     from ...datasets.errors import UserError
     from ..map.object_map import ObjectMap
-    from .tables import print_answers
+    from .tables import print_answers, print_explained
 
     object_map = ObjectMap.load(folder)
     if not object_map.knows(label):
@@ -42,8 +45,14 @@ def query(
         answers = object_map.find(label, min_probability)
     else:
         answers = object_map.nearest(near, label, min_probability=min_probability)
+    explained = [(answer, answer.thing.explain(label)) for answer in answers] if why else []
     if as_json:
-        typer.echo(json.dumps([_answer_to_dict(answer) for answer in answers], indent=1, ensure_ascii=False))
+        documents = [_answer_to_dict(answer) for answer in answers]
+        for document, (_, explanation) in zip(documents, explained, strict=False):
+            document["why"] = explanation.to_dict()
+        typer.echo(json.dumps(documents, indent=1, ensure_ascii=False))
+    elif explained:
+        print_explained(explained)
     elif answers:
         print_answers(answers)
     else:

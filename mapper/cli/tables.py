@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterable, Sequence
+from textwrap import indent
 from typing import TYPE_CHECKING
 
 from ..map.text import probability_text
 
 if TYPE_CHECKING:
+    from ..map.explanation import Explanation
     from ..map.object_map import Answer
     from ..map.thing import Thing
 
 WIDTH = 1000  # columns: a row stays one line, whatever the terminal or the file
+EXPLAINED_WIDTH = 100  # columns where the output is no terminal
+INDENT = "  "
 LARGEST = 40  # things shown after a run
 
 
@@ -36,6 +41,16 @@ def print_answers(answers: Sequence[Answer]) -> None:
         distance = (f"{answer.distance:.3f} ± {answer.distance_std:.3f}",) if with_distance else ()
         rows.append((probability_text(answer.probability), *distance, *_thing_cells(answer.thing)))
     _print_table(headers, rows)
+
+
+def print_explained(answers: Iterable[tuple[Answer, Explanation]]) -> None:
+    """Each answer with the views that mattered most for what was asked for, the table as wide as the terminal."""
+    width = shutil.get_terminal_size((EXPLAINED_WIDTH, 24)).columns - len(INDENT)
+    for number, (answer, explanation) in enumerate(answers):
+        if number:
+            print()
+        print_answers([answer])
+        print(indent(f"\n{explanation.table(width=width)}", INDENT))
 
 
 def _thing_cells(thing: Thing) -> tuple[str, ...]:

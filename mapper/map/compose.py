@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..estimation.landmarks import Landmark
+from .evidence_file import ThingViews
 from .thing import Evidence, Thing
 
 MIN_LISTED = 1e-6  # class probabilities below it are left out of a thing's posterior
@@ -34,6 +35,7 @@ def compose_thing(landmark: Landmark, classes: tuple[str, ...]) -> Thing:
         first_seen=landmark.first_seen,
         last_seen=landmark.last_seen,
         evidence=Evidence(len(landmark.supporting), len(landmark.occluded), len(landmark.contradicting)),
+        views=ThingViews(classes, tuple(landmark.log), landmark.log.left_out_by),
     )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from ...datasets.errors import InputError
 from ...datasets.json_record import JsonRecord
 from .atomic import make_folder, write_atomic
+from .evidence_file import EvidenceFile, StoredViews, evidence_path, write_evidence
 from .object_map import MapFrame, ObjectMap, UpDirection
 from .thing import Evidence, Thing
 
@@ -23,12 +24,22 @@ REMEDY = "correct that value or write the map again with `thingmap run`"
 NEGLIGIBLE = 1e-4  # class probability that is not written
 
 
-def write_map(object_map: ObjectMap, path: Path, include_doubtful: bool = False) -> Path:
-    """Write the map to a `.json` file, or as `map.json` into a folder, made where absent; returns the file's path."""
+def write_map(object_map: ObjectMap, path: Path, include_doubtful: bool = False, evidence: bool = True) -> Path:
+    """Write the map to a `.json` file, or as `map.json` into a folder, made where absent; returns the file's path.
+
+    With `evidence`, what is known of its things' views goes beside it first, so that no map names what is not there.
+    """
     folder = path.is_dir() or path.suffix != ".json"
     file = path / FILE_NAME if folder else path
     make_folder(file.parent)
-    write_atomic(file, format_document(to_document(object_map, include_doubtful)).encode())
+    document = to_document(object_map, include_doubtful)
+    if evidence:
+        beside = evidence_path(file)
+        sha256 = write_evidence(beside, _written(object_map, include_doubtful))
+        if sha256 is not None:
+            things = document.pop("things")
+            document |= {"evidence": {"file": beside.name, "sha256": sha256}, "things": things}
+    write_atomic(file, format_document(document).encode())
     return file
 
 
@@ -70,10 +81,12 @@ def to_document(object_map: ObjectMap, include_doubtful: bool = False) -> dict[s
             "source": up.source,
         },
         "classes": list(object_map.classes),
-        "things": [
-            thing_to_dict(thing) for thing in object_map.things if include_doubtful or thing.existence >= DOUBTFUL_BELOW
-        ],
+        "things": [thing_to_dict(thing) for thing in _written(object_map, include_doubtful)],
     }
+
+
+def _written(object_map: ObjectMap, include_doubtful: bool) -> list[Thing]:
+    return [thing for thing in object_map.things if include_doubtful or thing.existence >= DOUBTFUL_BELOW]
 
 
 def from_document(document: Any, file: Path) -> ObjectMap:
@@ -83,9 +96,10 @@ def from_document(document: Any, file: Path) -> ObjectMap:
         remedy = "open it with the version of thingmap that wrote it"
         raise InputError(file, f'the schema "{SCHEMA}"', repr(root.text("schema")), remedy)
     up = root.record("up")
+    evidence = _evidence_of(root, file)
     with root.explaining():
         return ObjectMap(
-            things=tuple(_thing_from(record) for record in root.records("things")),
+            things=tuple(_thing_from(record, evidence) for record in root.records("things")),
             classes=root.texts("classes"),
             source=root.text("source"),
             frame=MapFrame(root.choice("frame", tuple(MapFrame))),
@@ -130,7 +144,16 @@ def thing_to_dict(thing: Thing) -> dict[str, Any]:
     }
 
 
-def _thing_from(record: JsonRecord) -> Thing:
+def _evidence_of(root: JsonRecord, file: Path) -> EvidenceFile:
+    """The file of views that the map names; one without a fingerprint where it names none."""
+    if "evidence" not in root:
+        return EvidenceFile(evidence_path(file), "", file)
+    named = root.record("evidence")
+    with named.explaining():  # a name that is none, such as one with a slash
+        return EvidenceFile(file.with_name(named.name("file")), named.name("sha256"), file)
+
+
+def _thing_from(record: JsonRecord, views: EvidenceFile) -> Thing:
     evidence = record.record("evidence")
     with record.explaining():
         return Thing(
@@ -147,6 +170,7 @@ def _thing_from(record: JsonRecord) -> Thing:
             first_seen=record.number("first_seen"),
             last_seen=record.number("last_seen"),
             evidence=Evidence(*(evidence.count(name) for name in ("supporting", "occluded", "contradicting"))),
+            views=StoredViews(views, record.text("id")),
         )
 
 

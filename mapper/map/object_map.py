@@ -102,14 +102,18 @@ class ObjectMap:
 
         return read_map(Path(path))
 
-    def save(self, path: str | Path, include_doubtful: bool = False) -> Path:
+    def save(self, path: str | Path, include_doubtful: bool = False, *, evidence: bool = True) -> Path:
         """Write to a `.json` file, or as `map.json` into a folder; returns the file, which is replaced if it was there.
 
-        Things whose existence is below 0.5 are written only with `include_doubtful`.
+        Args:
+            path: where to.
+            include_doubtful: write things whose existence is below 0.5 too.
+            evidence: write what the views said too, so that things can be explained once they are loaded: into
+                `evidence.npz` beside `map.json`, into `NAME.evidence.npz` beside `NAME.json`.
         """
         from .map_file import write_map
 
-        return write_map(self, Path(path), include_doubtful)
+        return write_map(self, Path(path), include_doubtful, evidence)
 
     @property
     def R_world_upright(self) -> np.ndarray:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...datasets.errors import InputError, UserError
 from .atomic import make_folder, replacing, write_atomic
+from .evidence_file import evidence_path
 from .map_file import FILE_NAME as MAP_FILE
 from .object_map import ObjectMap
 
@@ -60,6 +61,11 @@ class OutputFolder:
         return self.path / MAP_FILE
 
     @property
+    def evidence_file(self) -> Path:
+        """What every view said about every thing; `Thing.explain` reads it."""
+        return evidence_path(self.map_file)
+
+    @property
     def trajectory_file(self) -> Path:
         """TUM format, a line for every frame that was mapped."""
         return self.path / "trajectory.txt"
@@ -95,6 +101,7 @@ class OutputFolder:
         return self.path / "snapshots"
 
     def write_map(self, object_map: ObjectMap, include_doubtful: bool = False) -> None:
+        """The map and the evidence of its things."""
         object_map.save(self.map_file, include_doubtful)
 
     def write_trajectory(self, stamps: np.ndarray, T_world_camera: np.ndarray) -> None:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...datasets.errors import UserError
 from .boxes import box_corners
+from .evidence_file import StoredViews, ThingViews
+from .explanation import Explanation, explain_views
 
 POSTERIOR_TOLERANCE = 1e-4  # how far `probability` and `class_posterior[label]` may differ through rounding
 
@@ -48,6 +51,7 @@ class Thing:
         first_seen: stamp of the first supporting view, seconds.
         last_seen: stamp of the last supporting view, seconds.
         evidence: counts of views.
+        views: what each of them said, in memory or in the map's evidence file; None where nobody knows. See `explain`.
 
     Raises:
         ValueError: where a shape or a value is not as above; it says which and what was found.
@@ -66,6 +70,7 @@ class Thing:
     first_seen: float
     last_seen: float
     evidence: Evidence
+    views: ThingViews | StoredViews | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         for name, shape in (("position", (3,)), ("position_covariance", (3, 3)), ("size", (3,)), ("size_std", (3,))):
@@ -106,6 +111,22 @@ class Thing:
         """P(it exists and is a `label`); upper and lower case are the same, 0 for a class it never was."""
         wanted = label.casefold()
         return self.existence * sum(p for name, p in self.class_posterior.items() if name.casefold() == wanted)
+
+    def explain(self, label: str | None = None, *, in_time_order: bool = False) -> Explanation:
+        """Why: what every view on record said for or against this thing being a `label`.
+
+        Args:
+            label: any class of the map, upper and lower case being the same; the likeliest by default.
+            in_time_order: instead of the strongest view first.
+
+        Raises:
+            UserError: no such label, or nothing is on record: it says what is missing and what to do.
+            InputError: the map's evidence file is missing, damaged or of another map.
+        """
+        if self.views is None:
+            raise UserError(f"{self.id}: nothing is on record of its views; take it from a mapper or a run's map")
+        label = self.label if label is None else label
+        return explain_views(self.views.read(), self.id, label, self.belief(label), in_time_order)
 
     def corners(self, R_world_upright: np.ndarray) -> np.ndarray:
         """(8, 3) corners of the box, metres, map frame; order and edges as in `boxes`."""

@@ -35,7 +35,8 @@ def test_the_folder_is_complete(out):
     assert report["frames_used"] == FRAMES and report["command"]["detector"] == "simulated"
     assert len(folder.read_cloud()[0]) > 1000 and folder.ledger_file.stat().st_size > 0
     assert sorted(path.name for path in out.iterdir()) == [
-        *("cloud.ply", "config.yaml", "keyframes.npz", "ledger.npz", "map.json", "report.json", "trajectory.txt")
+        *("cloud.ply", "config.yaml", "evidence.npz", "keyframes.npz", "ledger.npz", "map.json", "report.json"),
+        "trajectory.txt",
     ]
 
 
