@@ -105,9 +105,24 @@ class MappingJob:
         print_things(object_map.things)
         pace = f"{report.frames_used} frames in {report.seconds:.1f} s, {report.frames_per_second:.1f} frames/s"
         typer.echo(f"{len(object_map)} things from {pace}, {report.keyframes} keyframes; the map is in {path}")
+        batch = self.mapper.statistics().get("batch")
+        if batch is not None:
+            typer.echo(_batch_line(batch))
         if report.stopped:
             typer.echo(f"{report.stopped}; what was mapped before is in {path}", err=True)
             raise typer.Exit(130)
+
+
+def _batch_line(batch: dict[str, Any]) -> str:
+    """What batch inference did, of `BatchMapper.statistics`."""
+    if "samples" not in batch:
+        return "batch inference: no view"
+    return (
+        f"batch inference over {batch['views']} views: {batch['samples']} samples and {batch['sliding_volumes']} "
+        f"sliding volumes became {batch['before_suppression']} different ones, {batch['after_suppression']} after "
+        f"suppression, {batch['with_own_detections']} with detections of their own; "
+        f"{batch['iterations_median']:g} iterations (median), {batch['iterations_most']} at most"
+    )
 
 
 def _shower(progress: FrameProgress, then: Callable[[Progress], None]) -> Callable[[Progress], None]:

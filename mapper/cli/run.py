@@ -12,7 +12,10 @@ import typer
 from .sources import DatasetOption, MaxFramesOption, SequenceArgument, StrideOption, choose_detector
 
 if TYPE_CHECKING:
+    from ...datasets.sequence import Sequence
+    from ...detectors.detector import Detector
     from ..config import MapperConfig
+    from ..runner import Mapper
 
 
 class Odometry(StrEnum):
@@ -20,6 +23,16 @@ class Odometry(StrEnum):
 
     KISS_ICP = "kiss-icp"
     POSES = "poses"
+
+
+class Inference(StrEnum):
+    """How things are found."""
+
+    INCREMENTAL = "incremental"
+    BATCH = "batch"
+
+
+DEFAULT_VIEWS = 12  # of batch inference; the most in Meger et al., Clutter, figure 8
 
 
 def run(
@@ -32,6 +45,13 @@ def run(
     odometry: Annotated[Odometry | None, typer.Option(help="Camera motion from depth, or the given poses.")] = None,
     dataset: DatasetOption = None,
     config: Annotated[Path | None, typer.Option(metavar="FILE", help="YAML over the defaults.")] = None,
+    inference: Annotated[
+        Inference, typer.Option(help="Frame by frame, or over a fixed set of views at the end.")
+    ] = Inference.INCREMENTAL,
+    views: Annotated[
+        int | None,
+        typer.Option(min=1, metavar="N", help=f"Views of batch inference, evenly spread; {DEFAULT_VIEWS} by default."),
+    ] = None,
     stride: StrideOption = 1,
     max_frames: MaxFramesOption = None,
     seed: Annotated[int | None, typer.Option(metavar="N", help="Of everything random.")] = None,
@@ -52,10 +72,13 @@ def run(
     from ...detectors.spec import make_detector
     from ..config_file import dump_config
     from ..map.store import OutputFolder
-    from ..mapper import SemanticMapper
     from ..snapshots import parse_snapshot_frames
     from .job import MappingJob
 
+    if views is not None and inference is not Inference.BATCH:
+        raise UserError(
+            f"--views {views}: only of use with --inference {Inference.BATCH}; add it, or leave out --views"
+        )
     OutputFolder.check(output, overwrite)
     settings = _settings(config, seed, odometry)
     frames = open_sequence(sequence, dataset=dataset, stride=stride, max_frames=max_frames)
@@ -65,7 +88,7 @@ def run(
     detect = make_detector(spec, frames)
     MappingJob(
         sequence=frames,
-        mapper=SemanticMapper(detect, settings, source=frames.name, gravity=frames.gravity),
+        mapper=_make_mapper(frames, detect, settings, inference, views),
         detector=detect,
         spec=spec,
         folder=OutputFolder.create(output, overwrite),
@@ -76,10 +99,25 @@ def run(
             "detector": spec,
             "stride": stride,
             "max_frames": max_frames,
+            **({"inference": inference.value, "views": views or DEFAULT_VIEWS} if inference is Inference.BATCH else {}),
         },
         include_doubtful=include_doubtful,
         snapshots=parse_snapshot_frames(snapshots) if snapshots is not None else (),
     ).execute()
+
+
+def _make_mapper(
+    frames: Sequence, detect: Detector, settings: MapperConfig, inference: Inference, views: int | None
+) -> Mapper:
+    about = {"source": frames.name, "gravity": frames.gravity}
+    if inference is Inference.BATCH:
+        from ..batch.batch_mapper import BatchMapper
+        from ..proposals.views import spread_views
+
+        return BatchMapper(detect, settings, views=spread_views(views or DEFAULT_VIEWS, len(frames)), **about)
+    from ..mapper import SemanticMapper
+
+    return SemanticMapper(detect, settings, **about)
 
 
 def _settings(config: Path | None, seed: int | None, odometry: Odometry | None) -> MapperConfig:

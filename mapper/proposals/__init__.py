@@ -1,0 +1,1 @@
+"""Places and sizes of objects proposed from their detections, and refined until they agree with them."""
