@@ -17,6 +17,7 @@ from .detect import detect
 from .evaluate import evaluate
 from .export import export
 from .info import info
+from .learn import learn
 from .query import query
 from .run import run
 from .synth import synth
@@ -74,7 +75,7 @@ app = typer.Typer(
     add_completion=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, detect, query, export, info, evaluate, compare, synth):
+for command in (run, detect, query, export, info, evaluate, compare, synth, learn):
     app.command()(command)
 
 
