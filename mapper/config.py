@@ -154,6 +154,7 @@ class EvidenceConfig:
     depth: bool = True  # off: depth at an object's place says nothing for or against it
     parts: bool = True  # off: detections of object parts are not used
     model: str = ""  # path of an evidence model that `thingmap learn` wrote; "generic" for none; empty: the shipped one
+    # for a detector of its classes, the generic one for others
     free_space: FreeSpace = field(default_factory=FreeSpace)
     presence: PresenceConfig = field(default_factory=PresenceConfig)
 

@@ -13,7 +13,12 @@ from ..datasets.errors import UserError
 from ..datasets.frame import Frame
 from ..detectors.detections import Detections
 from ..detectors.detector import Detector
-from ..factors.evidence_model import EvidenceModel, generic_evidence_model, load_evidence_model
+from ..factors.evidence_model import (
+    EvidenceModel,
+    default_evidence_model,
+    generic_evidence_model,
+    load_evidence_model,
+)
 from ..factors.size_prior import ClassSizePriors, load_size_priors
 from .config import MapperConfig
 from .estimation.association import associate
@@ -58,7 +63,8 @@ class SemanticMapper:
         config: every number of the mapper.
         source: name of what is mapped, kept in the map.
         gravity: (3,) unit vector pointing down in the dataset's world, where known; used with the dataset's poses.
-        model: what is known of the detector; the one that the configuration names by default.
+        model: what is known of the detector; by default the one that the configuration names, else the shipped one
+            for a detector of its classes and the generic one for others (`default_evidence_model`).
     """
 
     def __init__(
@@ -72,7 +78,7 @@ class SemanticMapper:
     ) -> None:
         self.config = config or MapperConfig()
         self._detector, self._source = detector, source
-        self._learned = model or evidence_model(self.config.evidence.model)
+        self._learned = model or evidence_model(self.config.evidence.model)  # None: by the classes
         self._camera = CameraGraph(self.config, gravity)
         self._cloud = KeyframeCloud(self.config.cloud)
         self._scene = Scene()
@@ -178,6 +184,7 @@ class SemanticMapper:
             "retired": len(self._scene.retired),
             "graph_rebuilds": smoother.rebuilds if smoother else 0,
             "ledger_records": len(smoother.ledger) if smoother else 0,
+            "evidence_model": self._model.learned_from if self._model else "none was needed",
             "outcomes": {outcome.name.lower(): self._outcomes[outcome] for outcome in Outcome},
             "stages": self._clock.summary(),
         }
@@ -196,7 +203,7 @@ class SemanticMapper:
         if self._priors is None:
             extra = Path(self.config.class_sizes) if self.config.class_sizes else None
             self._classes = tuple(detections.classes)
-            self._model = self._learned.bind(self._classes)
+            self._model = (self._learned or default_evidence_model(self._classes)).bind(self._classes)
             self._priors = load_size_priors(self._classes, extra, self._model.background_size)
         if self._classes is not None and tuple(detections.classes) != self._classes:
             raise UserError(
@@ -223,8 +230,8 @@ class SemanticMapper:
         return sum(landmark.belief.existence >= PROBABLE for landmark in self._scene.landmarks.values())
 
 
-def evidence_model(name: str) -> EvidenceModel:
-    """The evidence model that a configuration names: a file, "generic" for none, or empty for the shipped one."""
+def evidence_model(name: str) -> EvidenceModel | None:
+    """The evidence model that a configuration names: a file, or "generic" for none; None where it names nothing."""
     if name == GENERIC:
         return generic_evidence_model()
-    return load_evidence_model(Path(name) if name else None)
+    return load_evidence_model(Path(name)) if name else None

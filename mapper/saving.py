@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from .map.atomic import replacing
-from .map.object_map import ObjectMap
+from .map.object_map import PROBABLE, ObjectMap
 from .map.store import OutputFolder
 from .run_report import RunReport
 from .runner import Mapper
@@ -34,6 +35,8 @@ def save_run(
         The map.
     """
     object_map = mapper.object_map(include_doubtful)
+    # a mapper that waits for all views has found nothing before it is asked
+    report = replace(report, things=sum(thing.existence >= PROBABLE for thing in object_map.things))
     folder.write_config(config)
     folder.write_trajectory(*mapper.trajectory())
     folder.write_keyframes(*mapper.keyframes())

@@ -40,10 +40,10 @@ class SnapshotWriter:
         frames = now.done - now.skipped
         if now.update is None or frames not in self._frames:
             return
+        object_map = self._mapper.object_map(include_doubtful=True)  # first: it may move the cameras too
         stamps, poses = self._mapper.trajectory()
         name = f"{frames:06d}.json"
         self._folder.snapshot_folder.mkdir(exist_ok=True)
-        object_map = self._mapper.object_map(include_doubtful=True)
         object_map.save(self._folder.snapshot_folder / name, include_doubtful=True, evidence=False)
         pose = np.round(poses[-1], 9).tolist()
         self._written.append({"frames": frames, "file": name, "stamp": float(stamps[-1]), "T_world_camera": pose})

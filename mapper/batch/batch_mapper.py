@@ -33,7 +33,8 @@ class BatchMapper(SemanticMapper):
     """Maps things from some views of a sequence; the other frames only tell how the camera moved.
 
     Inference happens when somebody asks for what is mapped, over the views so far. It starts from the camera's
-    measurements alone each time, so that asking early, or twice, changes nothing.
+    measurements alone each time, so that asking early, or twice, changes no later map. Poses are those of the joint
+    estimate once there is one, and the camera's own before.
 
     Args:
         detector, config, source, gravity, model: as for `SemanticMapper`.
@@ -141,6 +142,7 @@ class BatchMapper(SemanticMapper):
         for stored in self._stored:
             self._observe(stored)
         self._drop_unmeasured()
+        self._date_landmarks()
         self._lifecycle.bring_up_to_date()
         self._lifecycle.merge()
         self._lifecycle.retire()
@@ -162,6 +164,12 @@ class BatchMapper(SemanticMapper):
                 self._camera.smoother.retire(number)
                 del self._scene.landmarks[number]
         self._outcomes[Outcome.PROMOTED] = len(self._scene.landmarks)
+
+    def _date_landmarks(self) -> None:
+        """When each was seen first: in the first of the views that support it."""
+        stamps = {stored.keyframe: stored.frame.stamp for stored in self._stored}
+        for landmark in self._scene.landmarks.values():
+            landmark.first_seen = min((stamps[k] for k in landmark.supporting), default=landmark.first_seen)
 
     def _observe(self, stored: StoredView) -> None:
         """One view: visibility -> association -> factors -> smoothing -> class and existence."""

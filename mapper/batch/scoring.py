@@ -130,7 +130,7 @@ class VolumeLikelihood:
         key = detection, round(occlusion / OCCLUSION_STEP)
         if key not in self._read:
             d = self._detections[detection]
-            read = self._model.scores.evidence(d.scores, key[1] * OCCLUSION_STEP, d.part)
+            read = self._model.scores.evidence(d.scores, round(key[1] * OCCLUSION_STEP, 6), d.part)  # 14 * 0.05 > 0.7
             self._read[key] = read.own - (np.logaddexp.reduce(read.background) - np.log(len(read.background)))
         return self._read[key]
 

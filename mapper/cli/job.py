@@ -122,6 +122,7 @@ def _batch_line(batch: dict[str, Any]) -> str:
         f"sliding volumes became {batch['before_suppression']} different ones, {batch['after_suppression']} after "
         f"suppression, {batch['with_own_detections']} with detections of their own; "
         f"{batch['iterations_median']:g} iterations (median), {batch['iterations_most']} at most"
+        + (f", {batch['not_settled']} volumes not settled by then" if batch["not_settled"] else "")
     )
 
 

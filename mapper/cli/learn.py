@@ -64,7 +64,7 @@ def learn(
     existence = None if scores_only else _learn_existence(scenes, learned)
     if existence is not None:
         learned = replace(learned, model=existence.model)
-    _write(learned, output, page)
+    _write(learned, existence, output, page)
     _tell(learned)
     if existence is not None:
         typer.echo(existence.summary())
@@ -83,8 +83,12 @@ def _learn_existence(scenes: list[tuple[KnownScene, Detector]], learned: Learned
 
 
 def _check_output(output: Path, overwrite: bool) -> Path:
-    """Where the page goes; raises `InputError` where one of the two must not be written."""
+    """Where the page goes; raises `UserError` where one of the two must not, or cannot, be written.
+
+    Learning takes minutes: that its place cannot be written to shows before.
+    """
     from ...datasets.errors import InputError
+    from ..map.atomic import make_folder
 
     if output.suffix == ".html":
         raise InputError(output, "the name of a JSON file", "the name of its page", "end it in .json")
@@ -94,6 +98,7 @@ def _check_output(output: Path, overwrite: bool) -> Path:
             raise InputError(path, "a file to write", "a folder", "choose another name")
         if path.exists() and not overwrite:
             raise InputError(path, "a new file", "an existing one", "choose another name or add --overwrite")
+    make_folder(output.parent)
     return page
 
 
@@ -128,12 +133,11 @@ def _missing(scenes: list[tuple[KnownScene, Detector]], specs: list[str]) -> lis
     return lines
 
 
-def _write(learned: Learned, output: Path, page: Path) -> None:
+def _write(learned: Learned, existence: LearnedExistence | None, output: Path, page: Path) -> None:
     from ..learning.page import render_page
-    from ..map.atomic import make_folder, write_atomic
+    from ..map.atomic import write_atomic
 
-    make_folder(output.parent)
-    write_atomic(page, render_page(learned).encode())
+    write_atomic(page, render_page(learned, existence).encode())
     learned.model.save(output)
 
 

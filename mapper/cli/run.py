@@ -63,7 +63,7 @@ def run(
 ) -> None:
     """Map a sequence.
 
-    OUT gets map.json, trajectory.txt, keyframes.npz, cloud.ply, config.yaml, report.json and ledger.npz.
+    OUT gets map.json, evidence.npz, trajectory.txt, keyframes.npz, cloud.ply, config.yaml, report.json and ledger.npz.
 
     Ctrl-C ends the run after the frame at hand and writes what is mapped so far.
     """

@@ -152,7 +152,8 @@ class Observer:
         belief.look(place, hits, misses, free, depth, float(looks.seen[m]), looks.scores[m])
         if isinstance(member, Landmark):
             visible = np.asarray(looks.visible[m], dtype=np.float32)
-            self._smoother.add(Look(view.keyframe, member.number, hits, misses, free, visible, depth))
+            seen = float(looks.seen[m])
+            self._smoother.add(Look(view.keyframe, member.number, hits, misses, free, visible, depth, seen))
 
     def _detected(self, member: Landmark | Track, view: View, seen: Observation) -> None:
         if isinstance(member, Landmark):

@@ -104,10 +104,11 @@ class Box:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """What one keyframe said about a landmark: weighted hits, misses and log likelihood of the free ratio (nats).
+    """What one keyframe by itself said about a landmark: hits, misses, log likelihood of the free ratio (nats).
 
-    `visible` (5,) is the share of every `VolumePart` that was seen, `depth` the weighted mean log ratio of the depth
-    likelihood (nats).
+    `visible` (5,) is the share of every `VolumePart` that was seen, `depth` the mean log ratio of the depth likelihood
+    (nats); `free` and `depth` are times `seen`, the share of the volume that depth told of. How new the view was is
+    known from the poses.
     """
 
     keyframe: int
@@ -117,6 +118,7 @@ class Look:
     free: float
     visible: np.ndarray = field(default_factory=lambda: np.ones(5, dtype=np.float32))
     depth: float = 0.0
+    seen: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -46,7 +46,7 @@ class Lifecycle:
         self._scene, self._smoother, self._observer = scene, smoother, observer
         self._priors, self._model, self._outcomes = priors, model, outcomes
         self._tracks, self._beliefs, self._config = config.tracks, config.beliefs, config.lifecycle
-        self._evidence, self._offset = config.evidence, config.lifting.surface_offset
+        self._evidence, self._offset, self._seed = config.evidence, config.lifting.surface_offset, config.seed
         self._refused: dict[tuple[int, int], int] = {}  # pairs that were not one thing -> their measurements then
 
     def start_tracks(
@@ -137,7 +137,8 @@ class Lifecycle:
         seen = [(one.T_world_camera, detection) for one in latest for detection in one.detections]
         smoother = self._smoother
         posterior = track.belief.class_posterior()
-        return propose(seen, smoother.intrinsics, smoother.R_world_upright, self._priors, posterior, self._offset)
+        frame = smoother.intrinsics, smoother.R_world_upright
+        return propose(seen, *frame, self._priors, posterior, self._offset, self._seed)
 
     def _size_evidence(self, track: Track) -> np.ndarray:
         """(K + 1,) what the boxes of a candidate say about its class by its size."""

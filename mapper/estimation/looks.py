@@ -102,8 +102,9 @@ def take_looks(
     due = (weights * chance).sum(axis=1)
     came = (weights * chance * fired).sum(axis=1)
     detected = np.asarray(fired.any(axis=1))
-    # a detection of what nobody expected to be found is a detection
-    hits = np.where(due > 0.0, came / np.maximum(due, 1e-12), detected.astype(float))
+    # a detection by a template of which nobody expected it is a detection, and no miss of the other templates
+    unexpected = detected & (came <= 0.0)
+    hits = np.where(unexpected, 1.0, came / np.maximum(due, 1e-12))
     not_hidden = visibility.agreeing[:, WHOLE] + visibility.free[:, WHOLE]
     free = np.divide(visibility.free[:, WHOLE], not_hidden, out=np.zeros(len(known)), where=not_hidden > 0.0)
     seen = not_hidden * known * visibility.in_image[:, WHOLE] * config.depth

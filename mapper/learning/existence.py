@@ -86,7 +86,7 @@ def learn_existence(
     Args:
         scenes: sequences that know all their objects; others are not looked at.
         model: of the first stage.
-        classes: of the detectors.
+        classes: of the detectors; each must have all of them, in any order.
         config: of the mapper.
         on_frame: hears how many frames are mapped, of `ROUNDS` times those of the sequences that are looked at.
     """
@@ -95,7 +95,7 @@ def learn_existence(
     for _ in range(ROUNDS):
         mapped, worlds = [], []
         for scene, detector in complete:
-            one = landmark_samples(scene, detector, learned, config)
+            one = landmark_samples(scene, detector, learned, classes, config)
             if one is not None:
                 mapped.append(one)
                 worlds.append(scene.centers.tobytes())

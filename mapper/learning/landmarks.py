@@ -7,6 +7,7 @@ well calibrated as old ones.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -14,10 +15,12 @@ import numpy as np
 
 from ...datasets.errors import UserError
 from ...datasets.frame import BrokenFrame
+from ...datasets.ground_truth import GroundTruth
 from ...detectors.detector import Detector
 from ...factors.evidence_model import EvidenceModel
 from ...factors.existence import Evidence
 from ...factors.size_prior import load_size_priors
+from ...factors.size_table import plain_name
 from ..config import MapperConfig
 from ..estimation.landmarks import Landmark
 from ..estimation.size_site import measured_size, size_evidence
@@ -25,6 +28,7 @@ from ..evaluation.inputs.build_case import build_case
 from ..evaluation.inputs.case import Case, MappedRun
 from ..evaluation.things.matching import match_ranked
 from ..mapper import SemanticMapper
+from ..read_ahead import ReadAhead
 from .known_scene import KnownScene
 
 TAKEN_AFTER = (2, 3, 4, 6, 8, 12, 18, 26, 37, 60, 100, 160, 260)  # keyframes
@@ -39,7 +43,7 @@ class LandmarkSamples:
         information, vector: (N, 3, 3) and (N, 3) what was measured of the log half-axes.
         log_size: (N, 3) log half-axes, upright frame.
         label: (N,) index of the class of the object that it stands for; -1 where it stands for none.
-        scene: (N,) which sequence.
+        scene: (N,) which of those that were `joined`; of a single sequence, which time.
     """
 
     evidence: Evidence
@@ -67,7 +71,8 @@ class LandmarkSamples:
         self, classes: tuple[str, ...], background: tuple[np.ndarray, np.ndarray], config: MapperConfig
     ) -> LandmarkSamples:
         """The same with what the sizes say of the classes."""
-        priors = load_size_priors(classes, background=background)
+        extra = Path(config.class_sizes) if config.class_sizes else None
+        priors = load_size_priors(classes, extra, background)
         outlier = config.beliefs.size_outlier
         log_size = [
             size_evidence(*measured, priors, outlier) for measured in zip(self.information, self.vector, strict=True)
@@ -84,44 +89,62 @@ class LandmarkSamples:
 
 
 def landmark_samples(
-    scene: KnownScene, detector: Detector, model: EvidenceModel, config: MapperConfig
+    scene: KnownScene, detector: Detector, model: EvidenceModel, classes: Sequence[str], config: MapperConfig
 ) -> LandmarkSamples | None:
     """Maps one sequence; None where nothing became a landmark.
 
+    Args:
+        classes: K names, the order of the samples' columns and labels, whatever that of this detector.
+
     Raises:
-        UserError: none of its frames can be mapped.
+        UserError: none of its frames can be mapped, or the detector has other classes.
     """
     mapper = SemanticMapper(
         detector, replace(config, beliefs=replace(config.beliefs, size_coupling=False)), source=scene.name, model=model
     )
     taken: list[LandmarkSamples] = []
     wanted = set(TAKEN_AFTER)
-    for frame in scene.sequence:
-        try:
-            mapper.process_frame(frame)
-        except BrokenFrame:
-            continue
-        done = mapper.statistics()["keyframes"]
-        if done in wanted:
-            wanted.discard(done)
-            taken += _take(mapper, scene)
+    with ReadAhead(scene.sequence) as readings:
+        for reading in readings:
+            if isinstance(reading.result, BrokenFrame):
+                continue
+            try:
+                mapper.process_frame(reading.result)
+            except BrokenFrame:
+                continue
+            done = mapper.statistics()["keyframes"]
+            if done in wanted:
+                wanted.discard(done)
+                taken += _take(mapper, scene, classes)
     if not mapper.statistics()["keyframes"]:
         raise UserError(f"{scene.name}: none of the frames can be mapped")
     return LandmarkSamples.joined(taken) if taken else None
 
 
-def _take(mapper: SemanticMapper, scene: KnownScene) -> list[LandmarkSamples]:
+def _take(mapper: SemanticMapper, scene: KnownScene, classes: Sequence[str]) -> list[LandmarkSamples]:
     landmarks = {f"thing-{landmark.number:04d}": landmark for landmark in mapper.landmarks(include_retired=True)}
     if not landmarks:
         return []
     case = _case(mapper, scene)
     matching = match_ranked(case)
-    classes = [name.casefold() for name in case.run.object_map.classes]
+    columns = _columns(case.run.object_map.classes, classes, scene.name)
+    names = [plain_name(name) for name in classes]
     label = np.full(len(matching.things), -1)
     for thing, (_, true) in zip(matching.pairs[:, 0], matching.matched, strict=True):
-        label[thing] = classes.index(true.label.casefold())
+        label[thing] = names.index(plain_name(true.label))
     rows = [landmarks[placed.thing.id] for placed in matching.things]
-    return [_samples(rows, label)] if rows else []
+    return [_samples(rows, label, columns)] if rows else []
+
+
+def _columns(found: Sequence[str], wanted: Sequence[str], scene: str) -> np.ndarray:
+    """(K,) column among a detector's classes of every class that is wanted."""
+    place = {plain_name(name): k for k, name in enumerate(found)}
+    if set(place) != {plain_name(name) for name in wanted}:
+        raise UserError(
+            f"{scene}: expected a detector of the same {len(wanted)} classes for all sequences, found one of "
+            f"{len(found)}; learn from the sequences of one detector, or leave out this stage with --scores-only"
+        )
+    return np.array([place[plain_name(name)] for name in wanted])
 
 
 def _case(mapper: SemanticMapper, scene: KnownScene) -> Case:
@@ -132,12 +155,28 @@ def _case(mapper: SemanticMapper, scene: KnownScene) -> Case:
         return np.empty((0, 3)), None
 
     run = MappedRun(Path(), object_map, stamps, poses, {}, (), None, no_cloud)
-    return build_case(run, scene.truth)
+    return build_case(run, _in_words_of(object_map.classes, scene))
 
 
-def _samples(landmarks: list[Landmark], label: np.ndarray) -> LandmarkSamples:
+def _in_words_of(classes: tuple[str, ...], scene: KnownScene) -> GroundTruth:
+    """The truth in the detector's words, with the poses of the sequence where it has none of its own.
+
+    Objects of other classes are left out, as in the first stage: what is found there is no object that has a name.
+    """
+    truth, sequence = scene.truth, scene.sequence
+    said = {plain_name(name): name for name in classes}
+    known = [thing for thing in truth.objects if plain_name(thing.label) in said]
+    objects = tuple(replace(thing, label=said[plain_name(thing.label)]) for thing in known)
+    if truth.poses is None:
+        stamps = np.asarray(sequence.stamps, dtype=np.float64)
+        truth = replace(truth, names=tuple(sequence.names), stamps=stamps, poses=sequence.poses)
+    return replace(truth, classes=classes, objects=objects, sequence=None)
+
+
+def _samples(landmarks: list[Landmark], label: np.ndarray, columns: np.ndarray) -> LandmarkSamples:
     rows = [landmark.belief.evidence for landmark in landmarks]
     evidence = Evidence(**{f.name: np.concatenate([getattr(row, f.name) for row in rows]) for f in fields(Evidence)})
+    evidence = replace(evidence, own=evidence.own[:, columns], excess=evidence.excess[:, columns])
     measured = [measured_size(x.log_size, x.log_size_covariance, x.size_site) for x in landmarks]
     return LandmarkSamples(
         evidence=evidence,

@@ -39,8 +39,8 @@ _RATES = (
     "octave about the size; the largest stand for 100 trials or more."
 )
 _WEIGHTS = (
-    "A weight of 1 takes evidence at its word; 0.5 halves it, as is right for what is said twice; near 0 it did not "
-    "help; above 1 it was too modest."
+    "A weight of 1 takes evidence at its word; 0.5 halves it, as is right for what is said twice; much lower it "
+    "hardly helped; above 1 it was too modest."
 )
 _RELIABILITY = (
     "Of the landmarks that exist with 0.8, eight of ten should be objects, and of the objects that are named with 0.8, "

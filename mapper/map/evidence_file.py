@@ -22,7 +22,7 @@ from .atomic import write_atomic
 if TYPE_CHECKING:
     from .thing import Thing
 
-SCHEMA = "thingmap-evidence/1"
+SCHEMA = "thingmap-views/1"
 FILE_NAME = "evidence.npz"  # beside map.json; beside NAME.json it is NAME.evidence.npz
 REMEDY = "put the file of the same run back, or map again with `thingmap run`"
 COLUMNS = {  # one row a view; `frame` counts the frames' names in `meta`

@@ -70,19 +70,33 @@ def geometry_of(views: PackedViews) -> tuple[np.ndarray, ...]:
 
 @njit(cache=True)
 def _refine_all(geometry, found, priors, gates, most, class_id, x, chosen, iterations, settled, energies, hessians):
+    """Until the association stays, or comes back after one round: then the better one of the two that alternate.
+
+    Clutter, section V, warns of "oscillation between two associations that suggest nearby locations".
+    """
     means, informations = priors
-    before = np.empty(chosen.shape[1:], np.int64)
+    shape = chosen.shape[1:]
+    last, other = np.empty(shape, np.int64), np.empty(shape, np.int64)
     for n in range(len(x)):
         k = class_id[n]
+        prior = (means[k + 1], informations[k + 1])
         _associate(geometry, found, gates, k, x[n], chosen[n])
+        other[:] = -2
         while iterations[n] < most and not settled[n]:
-            prior = (means[k + 1], informations[k + 1])
-            if np.any(chosen[n] >= 0):
-                energies[n] = optimise(geometry, prior, chosen[n], x[n], hessians[n])
+            last[:] = chosen[n]
+            before_x, before_energy, before_H = x[n].copy(), energies[n], hessians[n].copy()
+            if np.any(last >= 0):
+                energies[n] = optimise(geometry, prior, last, x[n], hessians[n])
                 iterations[n] += 1
-            before[:] = chosen[n]
             _associate(geometry, found, gates, k, x[n], chosen[n])
-            settled[n] = np.all(before == chosen[n])
+            settled[n] = np.all(chosen[n] == last)
+            if not settled[n] and np.all(chosen[n] == other):
+                settled[n] = True
+                if before_energy < energies[n]:
+                    last[:], x[n], energies[n], hessians[n] = other, before_x, before_energy, before_H
+            other[:] = last
+            if settled[n] or iterations[n] == most:
+                chosen[n] = last  # under which x is the optimum
 
 
 @njit(cache=True)
