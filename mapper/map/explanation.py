@@ -14,6 +14,7 @@ from .evidence_file import ThingViews
 from .text import probability_text
 
 PART_NAMES = tuple(part.name.lower() for part in Part)
+NOT_INDEPENDENT = "each view by itself; views are not independent, ratios do not add up"
 LISTED = 12  # views in a table, unless asked otherwise
 WIDTH = 100  # columns of a table; below `NARROW` the last one says why, but not what follows from it
 NARROW = 92
@@ -121,6 +122,8 @@ class Explanation:
         if more := len(rest) + self.left_out:
             hidden = self.totals[Verdict.OCCLUDED] - sum(view.verdict is Verdict.OCCLUDED for view in shown)
             lines.append(f"and {more} more {'view' if more == 1 else 'views'}, {hidden} of them hidden")
+        if shown:
+            lines.append(NOT_INDEPENDENT)
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:

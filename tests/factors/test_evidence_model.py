@@ -15,7 +15,12 @@ from hypothesis import strategies as st
 from thingmap.datasets.errors import InputError, UserError
 from thingmap.factors.detection_model import DetectionModel
 from thingmap.factors.evidence_file import SCHEMA
-from thingmap.factors.evidence_model import EvidenceModel, generic_evidence_model, load_evidence_model
+from thingmap.factors.evidence_model import (
+    EvidenceModel,
+    default_evidence_model,
+    generic_evidence_model,
+    load_evidence_model,
+)
 from thingmap.factors.existence import ExistenceModel
 from thingmap.factors.score_model import BIN_CENTRES, ScoreModel
 
@@ -91,8 +96,18 @@ def test_the_shipped_model_tells_objects_from_false_boxes():
     model = load_evidence_model()
     pooled = model.scores.own_parameters(0, 0.0)[0][-1]
     assert pooled > model.scores.background_mean[-1, 0] + 0.1
-    assert model.detection.probability(1.0, 128.0) > 2.0 * model.detection.probability(0.3, 128.0)
+    assert model.detection.probability(1.0, 128.0) > 2.0 * model.detection.probability(0.15, 128.0)
     assert model.detection.relative(1.0, 128.0) > 0.8
+    assert model.background_size is not None and model.existence != ExistenceModel()
+
+
+def test_a_detector_of_other_classes_gets_the_generic_model():
+    shipped = load_evidence_model()
+    assert len(shipped.classes) >= 5
+    assert default_evidence_model(shipped.classes).learned_from == shipped.learned_from
+    assert default_evidence_model([name.upper() for name in shipped.classes] + ["sofa"]).classes == shipped.classes
+    strangers = ["sofa", "person", "car", shipped.classes[0]]
+    assert default_evidence_model(strangers).learned_from == generic_evidence_model().learned_from
 
 
 def document_of(tmp_path: Path, model: EvidenceModel) -> tuple[Path, dict[str, Any]]:

@@ -106,8 +106,8 @@ def test_as_text_it_is_a_short_table(make_thing, views):
         "frame-000004 1305031456.25 75% 100% 50% 25% 0% - -3.00 contradicted: seen through"
     )
     assert lines[5].endswith("0.75 +1.50 supported") and lines[6].endswith("-0.50 supported as cup")
-    assert lines[-1] == "and 40 more views, 40 of them hidden"
-    assert len(lines) == 11
+    assert lines[-2] == "and 40 more views, 40 of them hidden"
+    assert len(lines) == 12
 
 
 def test_a_table_is_cut_to_the_strongest_and_to_the_width(make_thing):
