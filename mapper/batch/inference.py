@@ -84,7 +84,8 @@ def infer_volumes(
     refined = refine(
         Volumes.concatenate(samples, sliding), packed, priors, config.association, config.batch.max_iterations
     )
-    likelihood = VolumeLikelihood(packed, found, model, priors, config.evidence, config.association)
+    potential = config.batch.score_potential
+    likelihood = VolumeLikelihood(packed, found, model, priors, config.evidence, config.association, potential)
     different = likelihood.score(distinct(refined), views)
     best = suppress(different, upright, config.batch.overlap)
     remaining = unexplained(best)

@@ -8,6 +8,9 @@ the likelihoods of its depth and of its appearance. In log ratios against "there
     A_ti = Psi_s Psi_g        where template i found it: score ratio, given its occlusion, times alignment
          = 1 - P_D(k, v_ti)   where it did not: near 1 where nobody would have expected it to
 
+Psi_s is the learned density ratio, or one of the two that Explicit Occlusion names (section 2.3): exp of a score mapped
+linearly to [-1, 1], or the odds of Platt's probability. Neither knows what is hidden; that is left to w.
+
 A view in which no template shows enough says nothing of appearance. Hypotheses are ranked by L; whether a landmark
 exists is decided by the joint graph.
 """
@@ -18,6 +21,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import logit
 
 from ...datasets.frame import Intrinsics
 from ...detectors.parts import part_box
@@ -25,7 +29,7 @@ from ...factors.evidence_model import EvidenceModel
 from ...factors.size_prior import ClassSizePriors
 from ...factors.visibility import Visibility, VolumePart, measure_visibility
 from ...factors.volume import project_volumes
-from ..config import AssociationConfig, EvidenceConfig
+from ..config import AssociationConfig, EvidenceConfig, ScorePotential
 from ..estimation.association_costs import box_sides
 from ..estimation.lifting import LiftedDetection
 from ..estimation.looks import template_weights
@@ -47,6 +51,7 @@ class VolumeLikelihood:
         priors: of the classes' sizes.
         config: which kinds of evidence are in use.
         alignment: variances of Psi_g.
+        potential: which Psi_s.
     """
 
     def __init__(
@@ -57,9 +62,10 @@ class VolumeLikelihood:
         priors: ClassSizePriors,
         config: EvidenceConfig,
         alignment: AssociationConfig,
+        potential: ScorePotential = ScorePotential.OCCLUSION,
     ) -> None:
         self._views, self._detections, self._model, self._priors = views, detections, model, priors
-        self._config, self._alignment = config, alignment
+        self._config, self._alignment, self._potential = config, alignment, potential
         self._read: dict[tuple[int, int], np.ndarray] = {}
 
     def score(self, volumes: Volumes, views: Sequence[View]) -> Volumes:
@@ -126,13 +132,21 @@ class VolumeLikelihood:
         return np.exp(-0.5 * ((shift**2).sum(axis=1) / c.centre_variance + ratio**2 / c.scale_variance))
 
     def _score_ratio(self, detection: int, occlusion: float) -> np.ndarray:
-        """(K,) log Psi_s: the scores of an object of each class against those of what merely looks like some class."""
+        """(K,) log Psi_s of an object of each class; learned, against what merely looks like some class."""
         key = detection, round(occlusion / OCCLUSION_STEP)
         if key not in self._read:
-            d = self._detections[detection]
-            read = self._model.scores.evidence(d.scores, round(key[1] * OCCLUSION_STEP, 6), d.part)  # 14 * 0.05 > 0.7
-            self._read[key] = read.own - (np.logaddexp.reduce(read.background) - np.log(len(read.background)))
+            # 14 * 0.05 > 0.7
+            self._read[key] = self._read_scores(self._detections[detection], round(key[1] * OCCLUSION_STEP, 6))
         return self._read[key]
+
+    def _read_scores(self, detection: LiftedDetection, occlusion: float) -> np.ndarray:
+        model, scores, part = self._model.scores, detection.scores, detection.part
+        if self._potential is ScorePotential.LINEAR:
+            return model.linear(np.nan_to_num(scores), part)
+        if self._potential is ScorePotential.PLATT:
+            return logit(np.clip(model.platt(np.nan_to_num(scores), part), LEAST, 1.0 - LEAST))
+        read = model.evidence(scores, occlusion, part)
+        return read.own - (np.logaddexp.reduce(read.background) - np.log(len(read.background)))
 
     def _depth_term(self, visibility: Visibility) -> np.ndarray:
         """(N,) nats: mean log ratio of the depth readings, as far as the volume is seen."""

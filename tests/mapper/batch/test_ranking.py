@@ -11,7 +11,7 @@ from thingmap.detectors.detections import Part
 from thingmap.mapper.batch.inference import infer_volumes
 from thingmap.mapper.batch.scoring import VolumeLikelihood
 from thingmap.mapper.batch.suppression import distinct, suppress, unexplained
-from thingmap.mapper.config import EvidenceConfig, MapperConfig
+from thingmap.mapper.config import EvidenceConfig, MapperConfig, ScorePotential
 from thingmap.mapper.proposals.refinement import refine
 from thingmap.mapper.proposals.volumes import Volumes
 
@@ -23,9 +23,15 @@ def mean_half(tools, k: int) -> np.ndarray:
     return np.exp(tools.priors.mean[k + 1])
 
 
-def score(table, tools, volumes: Volumes, config: EvidenceConfig = CONFIG.evidence) -> np.ndarray:
+def score(
+    table,
+    tools,
+    volumes: Volumes,
+    config: EvidenceConfig = CONFIG.evidence,
+    potential: ScorePotential = ScorePotential.OCCLUSION,
+) -> np.ndarray:
     found = [d for view in table.detections for d in view]
-    args = table.packed(), found, tools.model, tools.priors, config, CONFIG.association
+    args = table.packed(), found, tools.model, tools.priors, config, CONFIG.association, potential
     return VolumeLikelihood(*args).score(volumes, table.views()).log_likelihood
 
 
@@ -45,10 +51,20 @@ def mug(tools):
     return tools.Table(tools.around(5), ((0.0, 0.0, 0.0), mean_half(tools, MUG), MUG)).detect_all()
 
 
-def test_the_truth_is_likelier_than_what_is_beside_it_or_of_another_class(mug, tools):
+@pytest.mark.parametrize("potential", ScorePotential)
+def test_the_truth_is_likelier_than_what_is_beside_it_or_of_another_class(mug, tools, potential):
     rows = ((0.0, 0.0, 0.0), MUG), ((0.03, 0.0, 0.0), MUG), ((0.0, 0.0, 0.06), MUG), ((0.0, 0.0, 0.0), BOWL)
-    likelihood = score(mug, tools, with_detections(mug, tools, hypotheses(tools, *rows)))
+    likelihood = score(mug, tools, with_detections(mug, tools, hypotheses(tools, *rows)), potential=potential)
     assert likelihood[0] > likelihood[1:].max() + 1.0
+
+
+def test_a_linear_potential_is_the_papers(mug, tools):
+    """Of a score, hidden or not: the log ratio of a view's appearance moves by the line's own value."""
+    found = [d for view in mug.detections for d in view]
+    args = mug.packed(), found, tools.model, tools.priors, CONFIG.evidence, CONFIG.association, ScorePotential.LINEAR
+    read = VolumeLikelihood(*args)._score_ratio(0, 0.5)
+    np.testing.assert_allclose(read, tools.model.scores.linear(found[0].scores, found[0].part))
+    assert np.all(np.abs(read) <= 1.0)
 
 
 def test_an_object_that_nobody_detects_is_unlikely_unless_hidden(tools):
