@@ -13,12 +13,10 @@ from .detections import Part
 
 _HALF = np.tile(np.eye(4), (len(Part), 1, 1))  # of each part, the matrix from a whole box to the half's
 _WHOLE = np.tile(np.eye(4), (len(Part), 1, 1))  # and from the half's box to the whole one
-_SHOWN = np.ones((len(Part), 4), dtype=bool)
 # By part: which side of the box is moved to the middle, and the side opposite to it.
 for _part, _moved, _opposite in ((Part.TOP, 3, 1), (Part.BOTTOM, 1, 3), (Part.LEFT, 2, 0), (Part.RIGHT, 0, 2)):
     _HALF[_part, _moved, [_moved, _opposite]] = 0.5, 0.5
     _WHOLE[_part, _moved, [_moved, _opposite]] = 2.0, -1.0
-    _SHOWN[_part, _moved] = False
 
 
 def part_box(xyxy: np.ndarray, part: np.ndarray | int) -> np.ndarray:
@@ -48,18 +46,6 @@ def whole_box(xyxy: np.ndarray, part: np.ndarray | int) -> np.ndarray:
         As `xyxy`; it may reach out of the image.
     """
     return _times(_WHOLE, xyxy, part)
-
-
-def sides_of(part: np.ndarray | int) -> np.ndarray:
-    """Which sides of the whole object's box a template really shows; the other one is only implied.
-
-    Args:
-        part: one `Part` value, or (N,) of them.
-
-    Returns:
-        (4,) bool in the order of xyxy: left, top, right, bottom; (N, 4) for N parts.
-    """
-    return _SHOWN[part].copy()
 
 
 def _times(matrices: np.ndarray, xyxy: np.ndarray, part: np.ndarray | int) -> np.ndarray:

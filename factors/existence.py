@@ -27,7 +27,10 @@ objects and low for what is none, and is integrated out (h hits and m misses, we
     log p(h, m | object) - log p(h, m | none) = log B(a + h, b + m) / B(a, b) - log B(a0 + h, b0 + m) / B(a0, b0)
 
 *Geometry.* A surface at the place of an object may be anybody's, and that is one fact about the place and not one a
-view: free space and depth speak against an object without a limit and for one only once (`free_space.py`).
+view: free space and depth speak against an object without a limit and for one only once. With S the sum over views and
+u the share of the places without an object where a surface looks like one:
+
+    evidence = S - log((1 - u) + u e^S)  <=  -log u
 """
 
 from __future__ import annotations
@@ -130,7 +133,7 @@ class ExistenceModel:
         return self.weight_score * named, self.weight_score * null
 
     def _once(self, total: np.ndarray) -> np.ndarray:
-        """Nats for an object from a sum over views that a mere surface explains as well: S - log(u + (1 - u) e^S)."""
+        """Nats for an object from a sum over views that a mere surface explains as well: S - log(1 - u + u e^S)."""
         empty = 1.0 - self.surface
         return total - np.logaddexp(np.log(empty), np.log(self.surface) + total)
 

@@ -4,9 +4,8 @@ The free ratio of a view is the share of the volume's pixels whose depth lies be
 occluded (Explicit Occlusion, section 2.2: what is occluded says nothing). For an object it is near zero up to sensor
 error and the volume's misfit (half-normal, as in the paper). Where there is no object, the volume is either as empty as
 chance has it (uniform) or, from every side alike, filled by some surface that looks like an object to the depth camera.
-Which of the two is one fact about the place and not one a view, so a surface speaks for an object only once:
-
-    S = Σ_t w_t log N+(free_t; 0, σ),   evidence = S - log(u + (1 - u) e^S)  <=  -log(1 - u)
+Which of the two is one fact about the place and not one a view, so a surface speaks for an object only once
+(`existence.py`).
 
 That something which was there *has been taken away* is another question. A chair has gaps, and a volume that is too
 large shows free pixels for ever: what an object's views usually have is no sign of its absence, only what exceeds it
@@ -34,7 +33,6 @@ class FreeSpace:
     Attributes:
         sigma: half-normal scale for objects, an ellipsoid being none of them: 0.14 at their true place, 0.18 to 0.19
             as a map has them.
-        uniform: u, share of places without an object that are empty.
         bound: one view says at most this, nats.
         excess_sigma: half-normal scale of what exceeds the usual. The root mean square is 0.08, but the tail is heavy:
             this is the scale of the 99th percentile, 0.33, since nothing that is there may be taken for gone.
@@ -43,7 +41,6 @@ class FreeSpace:
     """
 
     sigma: float = 0.19
-    uniform: float = 0.5
     bound: float = 3.0
     excess_sigma: float = 0.13
     removed_shape: float = 3.0
@@ -51,10 +48,6 @@ class FreeSpace:
     def log_likelihood(self, free: np.ndarray) -> np.ndarray:
         """(N,) free ratios in [0, 1] of one view to (N,) log densities if there is an object, nats."""
         return np.maximum(_log_half_normal(free, self.sigma), -self.bound)
-
-    def evidence(self, total: float) -> float:
-        """Nats for being an object, from the weighted sum of its views' log likelihoods."""
-        return float(total - np.logaddexp(np.log(self.uniform), np.log1p(-self.uniform) + total))
 
     def removed(self, free: np.ndarray, usual: np.ndarray | float) -> np.ndarray:
         """(N,) nats that one view says for "it has been taken away" against "it is still there", within +-`bound`.

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..estimation.landmarks import Landmark
-from .evidence_file import ThingViews
 from .thing import Evidence, Thing
+from .views_file import ThingViews
 
 MIN_LISTED = 1e-6  # class probabilities below it are left out of a thing's posterior
 

@@ -10,8 +10,8 @@ from typing import Any
 from ...datasets.errors import UserError
 from ...detectors.detections import Part
 from ..estimation.view_log import FAINT, Verdict, ViewNote
-from .evidence_file import ThingViews
 from .text import probability_text
+from .views_file import ThingViews
 
 PART_NAMES = tuple(part.name.lower() for part in Part)
 NOT_INDEPENDENT = "each view by itself; views are not independent, ratios do not add up"

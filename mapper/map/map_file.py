@@ -13,9 +13,9 @@ import numpy as np
 from ...datasets.errors import InputError
 from ...datasets.json_record import JsonRecord
 from .atomic import make_folder, write_atomic
-from .evidence_file import EvidenceFile, StoredViews, evidence_path, write_evidence
 from .object_map import MapFrame, ObjectMap, UpDirection
 from .thing import Evidence, Thing
+from .views_file import EvidenceFile, StoredViews, evidence_path, write_views
 
 SCHEMA = "thingmap/1"
 FILE_NAME = "map.json"
@@ -35,7 +35,7 @@ def write_map(object_map: ObjectMap, path: Path, include_doubtful: bool = False,
     document = to_document(object_map, include_doubtful)
     if evidence:
         beside = evidence_path(file)
-        sha256 = write_evidence(beside, _written(object_map, include_doubtful))
+        sha256 = write_views(beside, _written(object_map, include_doubtful))
         if sha256 is not None:
             things = document.pop("things")
             document |= {"evidence": {"file": beside.name, "sha256": sha256}, "things": things}

@@ -11,9 +11,9 @@ import numpy as np
 
 from ...datasets.errors import InputError, UserError
 from .atomic import make_folder, replacing, write_atomic
-from .evidence_file import evidence_path
 from .map_file import FILE_NAME as MAP_FILE
 from .object_map import ObjectMap
+from .views_file import evidence_path
 
 AGAIN = "write it again with `thingmap run`"
 TRAJECTORY_HEADER = "stamp tx ty tz qx qy qz qw: T_world_camera in seconds and metres"

@@ -10,8 +10,8 @@ import numpy as np
 
 from ...datasets.errors import UserError
 from .boxes import box_corners
-from .evidence_file import StoredViews, ThingViews
 from .explanation import Explanation, explain_views
+from .views_file import StoredViews, ThingViews
 
 POSTERIOR_TOLERANCE = 1e-4  # how far `probability` and `class_posterior[label]` may differ through rounding
 

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 from thingmap.detectors.detections import Detections, Part
 from thingmap.detectors.letterbox import Letterbox
-from thingmap.detectors.parts import part_box, sides_of, whole_box
+from thingmap.detectors.parts import part_box, whole_box
 
 BOX = np.array([10.0, 20.0, 50.0, 100.0])
 HALVES = {
@@ -53,23 +53,6 @@ def test_halves_have_half_the_area_and_lie_inside(drawn: tuple[np.ndarray, np.nd
     assert np.all(half[:, :2] >= xyxy[:, :2] - 1e-9) and np.all(half[:, 2:] <= xyxy[:, 2:] + 1e-9)
     area, of_half = (np.prod(x[:, 2:] - x[:, :2], axis=1) for x in (xyxy, half))
     np.testing.assert_allclose(of_half, np.where(part == Part.WHOLE, 1.0, 0.5) * area, rtol=1e-6, atol=1e-6)
-
-
-@given(boxes_and_parts())
-def test_the_sides_that_a_template_shows_are_those_it_shares_with_the_whole(drawn: tuple[np.ndarray, np.ndarray]):
-    xyxy, part = drawn
-    shown = sides_of(part)
-    assert shown.shape == xyxy.shape and np.all(shown.sum(axis=1) == np.where(part == Part.WHOLE, 4, 3))
-    np.testing.assert_array_equal(part_box(xyxy, part)[shown], xyxy[shown])
-
-
-def test_sides_by_name():
-    left, top, right, bottom = sides_of(Part.LEFT)
-    assert left and top and bottom and not right
-    assert sides_of(Part.TOP).tolist() == [True, True, True, False]
-    assert sides_of(Part.BOTTOM).tolist() == [True, False, True, True]
-    sides_of(Part.LEFT)[:] = True
-    assert not sides_of(Part.LEFT)[2], "what is handed out is the caller's own"
 
 
 def test_halving_goes_through_a_letterbox():

@@ -14,9 +14,9 @@ import pytest
 
 from thingmap.datasets.errors import InputError, UserError
 from thingmap.mapper.estimation.view_log import Verdict, ViewNote
-from thingmap.mapper.map.evidence_file import ThingViews
 from thingmap.mapper.map.object_map import ObjectMap
 from thingmap.mapper.map.store import OutputFolder
+from thingmap.mapper.map.views_file import ThingViews
 
 CLASSES = ("cup", "bowl", "book")
 NOTHING_LEFT_OUT = dict.fromkeys(Verdict, 0)

@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 from thingmap.mapper.cli.main import app
 from thingmap.mapper.estimation.view_log import Verdict, ViewNote
-from thingmap.mapper.map.evidence_file import ThingViews
 from thingmap.mapper.map.store import OutputFolder
+from thingmap.mapper.map.views_file import ThingViews
 
 CLASSES = ("cup", "bowl", "book")
 

@@ -138,7 +138,7 @@ def evidence_path(map_file: Path) -> Path:
     return map_file.with_name(FILE_NAME if map_file.name == "map.json" else f"{map_file.stem}.{FILE_NAME}")
 
 
-def write_evidence(path: Path, things: Sequence[Thing]) -> str | None:
+def write_views(path: Path, things: Sequence[Thing]) -> str | None:
     """Writes the views of things; returns the file's SHA-256, None where nothing is known of any view.
 
     Then no file is made, but one that is there becomes an empty one: it is of another map.
