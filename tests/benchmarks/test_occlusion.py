@@ -127,7 +127,7 @@ def job(tmp_path_factory: pytest.TempPathFactory, fixed_code: str) -> Job:
 
 
 def test_a_map_is_judged_as_by_thingmap_evaluate(job: Job, tmp_path: Path) -> None:
-    material, stored = read_material(scene_folder(job.scene, job.folder)), read(job, FULL)
+    material, stored = read_material(scene_folder(job.scene, job.folder), job.scene.seed), read(job, FULL)
     found = {frame.index: found for frame, found in zip(material.frames, material.detections, strict=True)}
     mapper, out = SemanticMapper(lambda frame: found[frame.index]), OutputFolder.create(tmp_path / "out")
     report = SequenceRun(open_sequence(scene_folder(job.scene, job.folder)), mapper, SnapshotWriter(out, mapper, VIEWS))
@@ -149,7 +149,7 @@ def test_a_map_is_judged_as_by_thingmap_evaluate(job: Job, tmp_path: Path) -> No
 
 
 def test_the_detector_is_judged_in_the_view_after_the_maps(job: Job) -> None:
-    material, stored = read_material(scene_folder(job.scene, job.folder)), read(job, DETECTOR_ALONE)
+    material, stored = read_material(scene_folder(job.scene, job.folder), job.scene.seed), read(job, DETECTOR_ALONE)
     assert stored is not None and material.truth.frame_truth is not None
     seen, classes = material.truth.frame_truth(4), material.truth.classes
     assert seen is not None
@@ -184,7 +184,7 @@ def test_an_interrupted_benchmark_goes_on(job: Job) -> None:
 
 def test_results_of_another_detector_are_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     before = code_mark()
-    monkeypatch.setattr(occlusion_job, "DETECTOR", "simulated?seed=2")
+    monkeypatch.setattr(occlusion_job, "DETECTOR", "simulated?seed={seed}")
     assert code_mark() != before
 
 
