@@ -129,9 +129,10 @@ def _head(options: argparse.Namespace) -> str:
     seeds = f"seeds {options.first_seed} to {options.first_seed + options.scenes - 1}"
     return (
         f"{options.scenes} `survey` scenes of {options.frames} frames a clutter level, {seeds}; detections of "
-        f"`{DETECTOR.format(seed='SEED')}`, SEED being the scene's, the same for all mappers; evaluator {VERSION}. The full model's lead in points, mean over {ENOUGH} to "
-        f"{max(VIEWS)} views, with the {CONFIDENCE:.0%} interval of {DRAWS} draws of scenes; at how many of these "
-        "numbers of views it is ahead. The detector alone has seen the view that all are judged in; the maps have not."
+        f"`{DETECTOR.format(seed='SEED')}`, SEED being the scene's, the same for all mappers; evaluator {VERSION}. The "
+        f"full model's lead in points, mean over {ENOUGH} to {max(VIEWS)} views, with the {CONFIDENCE:.0%} interval of "
+        f"{DRAWS} draws of scenes; at how many of these numbers of views it is ahead. The detector alone has seen the "
+        "view that all are judged in; the maps have not."
     )
 
 
