@@ -109,7 +109,7 @@ def test_a_folder_with_files_is_kept(tmp_path: Path) -> None:
     assert [file.name for file in tmp_path.rglob("*")] == ["color", "mine.png"]
 
 
-def test_ctrl_c_leaves_a_shorter_sequence(tmp_path: Path, monkeypatch) -> None:
+def test_ctrl_c_leaves_a_shorter_sequence(tmp_path: Path, monkeypatch, request: pytest.FixtureRequest) -> None:
     import os
     import signal
 
@@ -125,6 +125,8 @@ def test_ctrl_c_leaves_a_shorter_sequence(tmp_path: Path, monkeypatch) -> None:
         return encode(instances)
 
     monkeypatch.setattr(writing, "encode_instances", press)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job may be told to ignore it
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
     options = ("--frames", "40", "--width", "64", "--objects", "3", "--clutter", "low")
     result = thingmap("synth", *options, "-o", tmp_path / "out")
     assert result.exit_code == 130, result.stderr
