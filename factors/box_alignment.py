@@ -30,7 +30,7 @@ from .visibility import VolumePart
 from .volume import project_kernel
 
 # By `VolumePart`: the side of a half's box that is the middle of the whole box; it lies opposite the side it replaces.
-_MIDDLE_SIDE = (-1, 3, 1, 2, 0)
+MIDDLE_SIDE = (-1, 3, 1, 2, 0)
 
 
 def box_alignment_factor(
@@ -66,7 +66,7 @@ def box_alignment_factor(
         raise ValueError(f"sides_seen must have shape (4,), but got {seen.shape}")
     if not 0.0 < sigma_px < np.inf:
         raise ValueError(f"sigma_px must be positive, but got {sigma_px}")
-    middle = _MIDDLE_SIDE[VolumePart(part)]
+    middle = MIDDLE_SIDE[VolumePart(part)]
     # A detector may draw a clipped side some pixels inside or outside the border; what is certain is the laxer bound.
     inside = np.array([-0.5, -0.5, intrinsics.width - 0.5, intrinsics.height - 0.5])
     lax = np.concatenate([np.maximum(measured[:2], inside[:2]), np.minimum(measured[2:], inside[2:])])

@@ -19,7 +19,7 @@ business of `depth_likelihood.py`; both are measured in one pass over the pixels
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -75,6 +75,21 @@ class Visibility:
         for name in ("depth_log_ratio", "readings"):
             if getattr(self, name) is None:
                 object.__setattr__(self, name, np.zeros(np.shape(self.free)))
+
+    @property
+    def not_hidden(self) -> np.ndarray:
+        """(N, 5) share of the pixels with a reading that are not occluded."""
+        return self.agreeing + self.free
+
+    @property
+    def told(self) -> np.ndarray:
+        """(N, 5) share of every part that depth tells of: not occluded, in the image, with readings."""
+        return self.not_hidden * (1.0 - self.missing) * self.in_image
+
+    def as_if_clear(self) -> Visibility:
+        """The same without the depth map: nothing is hidden, and nothing is known to be there or not."""
+        none = np.zeros_like(self.occluded)
+        return replace(self, occluded=none, agreeing=none, free=none, missing=none, depth_log_ratio=none)
 
     @property
     def visible(self) -> np.ndarray:

@@ -19,9 +19,11 @@ from ..factors.evidence_model import (
     generic_evidence_model,
     load_evidence_model,
 )
+from ..factors.score_model import ScoreEvidence
 from ..factors.size_prior import ClassSizePriors, load_size_priors
+from ..factors.visibility import Visibility
 from .config import MapperConfig
-from .estimation.association import associate
+from .estimation.association import Assignment, Targets, associate
 from .estimation.evidence import Observer, class_evidence, score_evidence
 from .estimation.landmarks import Landmark
 from .estimation.lifecycle import Lifecycle
@@ -116,16 +118,10 @@ class SemanticMapper:
 
     def _map(self, view: View, lifted: list[LiftedDetection]) -> None:
         """One keyframe: visibility -> association -> factors -> smoothing -> class and existence -> lifecycle."""
-        config, scene, model, stage = self.config, self._scene, self._model, self._clock.stage
-        assert self._lifecycle is not None and self._observer is not None and model is not None
+        stage = self._clock.stage
+        assert self._lifecycle is not None and self._observer is not None
         lifecycle, observer, smoother = self._lifecycle, self._observer, self._camera.smoother
-        with stage("visibility"):
-            targets, visibility = scene.predict(view, config.association, config.evidence.occlusion)
-        with stage("association"):
-            scores = score_evidence(lifted, model)
-            evidence = class_evidence(scores, scene.members())
-            camera = view.T_world_camera, view.R_world_upright
-            assignment = associate(lifted, targets, evidence, *camera, config.association)
+        targets, visibility, scores, assignment = self._associate(view, lifted)
         with stage("factors"):
             touched = observer.observe(view, lifted, assignment, targets, visibility)
             lifecycle.start_tracks(view, lifted, scores, assignment)
@@ -135,9 +131,24 @@ class SemanticMapper:
         with stage("beliefs"):
             lifecycle.refresh(touched | promoted)
         with stage("lifecycle"):
-            if promoted or view.keyframe % config.lifecycle.merge_every == 0:
+            if promoted or view.keyframe % self.config.lifecycle.merge_every == 0:
                 lifecycle.merge()
             lifecycle.retire()
+
+    def _associate(
+        self, view: View, lifted: list[LiftedDetection]
+    ) -> tuple[Targets, Visibility, list[ScoreEvidence], Assignment]:
+        """What a view should show, how much of it is visible, what its scores say, and which detection shows what."""
+        config, scene, stage = self.config, self._scene, self._clock.stage
+        assert self._model is not None
+        with stage("visibility"):
+            targets, visibility = scene.predict(view, config.association, config.evidence.occlusion)
+        with stage("association"):
+            scores = score_evidence(lifted, self._model)
+            evidence = class_evidence(scores, scene.members())
+            camera = view.T_world_camera, view.R_world_upright
+            assignment = associate(lifted, targets, evidence, *camera, config.association)
+        return targets, visibility, scores, assignment
 
     def landmarks(self, include_retired: bool = False) -> tuple[Landmark, ...]:
         """Landmarks as estimated now, for those who want to know more of them than a map tells."""

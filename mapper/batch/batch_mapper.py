@@ -13,9 +13,6 @@ from ...detectors.detections import Detections
 from ...detectors.detector import Detector
 from ...factors.evidence_model import EvidenceModel
 from ..config import MapperConfig
-from ..estimation.association import associate
-from ..estimation.beliefs import Belief
-from ..estimation.evidence import class_evidence, score_evidence
 from ..estimation.landmarks import Landmark
 from ..estimation.outcomes import Outcome
 from ..estimation.scene import Scene
@@ -149,13 +146,10 @@ class BatchMapper(SemanticMapper):
         self._lifecycle.bring_up_to_date()
 
     def _add_landmark(self, volume: VolumeHypothesis) -> None:
-        assert self._model is not None and self._lifecycle is not None
-        evidence, first = self.config.evidence, self._stored[0].frame.stamp
-        nothing = Belief(
-            len(self._classes or ()), self._model, self.config.beliefs, evidence.presence, evidence.free_space
-        )
+        assert self._lifecycle is not None
+        first = self._stored[0].frame.stamp
         place = volume.position, volume.log_size, volume.covariance
-        self._lifecycle.add_landmark(*place, nothing, (first, first))
+        self._lifecycle.add_landmark(*place, self._lifecycle.new_belief(), (first, first))
 
     def _drop_unmeasured(self) -> None:
         """What no detection was assigned to, when each may show one thing only, is nowhere in particular."""
@@ -173,13 +167,10 @@ class BatchMapper(SemanticMapper):
 
     def _observe(self, stored: StoredView) -> None:
         """One view: visibility -> association -> factors -> smoothing -> class and existence."""
-        assert self._lifecycle is not None and self._observer is not None and self._model is not None
-        config, smoother, scene = self.config, self._camera.smoother, self._scene
+        assert self._lifecycle is not None and self._observer is not None
+        smoother = self._camera.smoother
         view, lifted = stored.at(smoother.pose(stored.keyframe), smoother.R_world_upright), list(stored.detections)
-        targets, visibility = scene.predict(view, config.association, config.evidence.occlusion)
-        evidence = class_evidence(score_evidence(lifted, self._model), scene.members())
-        camera = view.T_world_camera, view.R_world_upright
-        assignment = associate(lifted, targets, evidence, *camera, config.association)
+        targets, visibility, _, assignment = self._associate(view, lifted)
         touched = self._observer.observe(view, lifted, assignment, targets, visibility)
         smoother.update()
         self._lifecycle.refresh(touched)

@@ -90,8 +90,7 @@ class VolumeLikelihood:
         camera = view.T_world_camera, view.R_world_upright
         visibility = measure_visibility(view.frame.depth, k, *camera, volumes.position, volumes.log_size)
         if not self._config.occlusion:
-            none = np.zeros_like(visibility.occluded)
-            visibility = replace(visibility, occluded=none, agreeing=none, free=none, missing=none)
+            visibility = visibility.as_if_clear()
         sides, _ = project_volumes(*camera, volumes.position, volumes.log_size, k)
         weights = template_weights(visibility.visible, self._views.templates)
         ratio = self._template_ratios(volumes, v, sides, visibility, k)
@@ -153,9 +152,7 @@ class VolumeLikelihood:
         if not self._config.depth:
             return np.zeros(len(visibility.pixels))
         whole = VolumePart.WHOLE
-        not_hidden = visibility.agreeing[:, whole] + visibility.free[:, whole]
-        seen = not_hidden * (1.0 - visibility.missing[:, whole]) * visibility.in_image[:, whole]
-        return visibility.depth_log_ratio[:, whole] * seen
+        return visibility.depth_log_ratio[:, whole] * visibility.told[:, whole]
 
 
 def _clip(boxes: np.ndarray, intrinsics: Intrinsics) -> np.ndarray:

@@ -64,8 +64,7 @@ class Lifecycle:
             self._outcomes[Outcome.NEW_TRACK] += 1
 
     def _start_track(self, view: View, shown: list[LiftedDetection], scores: ScoreEvidence) -> None:
-        best, evidence = shown[0], self._evidence
-        belief = Belief(len(best.scores), self._model, self._beliefs, evidence.presence, evidence.free_space)
+        best, belief = shown[0], self.new_belief()
         covariance = view.covariance_to_world(best.covariance())
         track = Track(self._scene.next_track, view.to_world(best.centre), covariance, belief)
         self._scene.next_track += 1
@@ -106,6 +105,12 @@ class Lifecycle:
             self._observer.measure(landmark, seen)
         self._outcomes[Outcome.PROMOTED] += 1
         return landmark.number
+
+    def new_belief(self) -> Belief:
+        """Of something of which nothing is known."""
+        evidence = self._evidence
+        classes = len(self._model.classes)
+        return Belief(classes, self._model, self._beliefs, evidence.presence, evidence.free_space)
 
     def add_landmark(
         self,

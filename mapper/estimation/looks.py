@@ -105,11 +105,10 @@ def take_looks(
     # a detection by a template of which nobody expected it is a detection, and no miss of the other templates
     unexpected = detected & (came <= 0.0)
     hits = np.where(unexpected, 1.0, came / np.maximum(due, 1e-12))
-    not_hidden = visibility.agreeing[:, WHOLE] + visibility.free[:, WHOLE]
+    not_hidden = visibility.not_hidden[:, WHOLE]
     free = np.divide(visibility.free[:, WHOLE], not_hidden, out=np.zeros(len(known)), where=not_hidden > 0.0)
-    seen = not_hidden * known * visibility.in_image[:, WHOLE] * config.depth
+    seen = visibility.told[:, WHOLE] * config.depth
     shown, scores = _read_scores(detections, detection_of, visible, weights, model)
-    depth = np.zeros(len(known)) if visibility.depth_log_ratio is None else visibility.depth_log_ratio[:, WHOLE]
     return Looks(
         visible=visible,
         detected=detected,
@@ -118,7 +117,7 @@ def take_looks(
         free_ratio=free,
         seen=seen,
         free=free_space.log_likelihood(free) * seen,
-        depth=depth * seen,
+        depth=visibility.depth_log_ratio[:, WHOLE] * seen,
         shown=shown,
         scores=scores,
     )

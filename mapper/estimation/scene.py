@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ...factors.visibility import Visibility, VolumePart, measure_visibility
@@ -45,9 +43,7 @@ class Scene:
         k = view.frame.intrinsics
         visibility = measure_visibility(view.frame.depth, k, *camera, positions, log_sizes)
         if not occlusion:
-            none = np.zeros_like(visibility.occluded)
-            ratios = {"occluded": none, "agreeing": none, "free": none, "missing": none, "depth_log_ratio": none}
-            visibility = replace(visibility, **ratios)
+            visibility = visibility.as_if_clear()
         xyxy, _ = project_volumes(*camera, positions, log_sizes, k)
         clipped = np.clip(xyxy, -0.5, np.array([k.width, k.height, k.width, k.height]) - 0.5)
         parts = visibility.visible

@@ -17,6 +17,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ...factors import box_alignment
 from ...factors.volume import project_kernel
 
 HUBER = 1.345  # 95 % efficiency on Gaussian errors
@@ -24,8 +25,7 @@ STEPS = 40  # at most
 SMALL_STEP = 1e-5  # m and log units; a step below it ends the descent
 SMALL_GAIN = 1e-7  # relative decrease of E that ends it
 MAX_DAMPING = 1e8
-# By `VolumePart`: the side of a half's box that is the middle of the whole box; it lies opposite the side it replaces.
-MIDDLE_SIDE = np.array([-1, 3, 1, 2, 0])
+MIDDLE_SIDE = np.array(box_alignment.MIDDLE_SIDE)  # numba reads arrays
 
 
 @njit(cache=True)
