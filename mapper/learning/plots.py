@@ -17,30 +17,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from ...factors.score_model import BIN_CENTRES, TRUNCATION, ScoreModel
-from ..evaluation.reporting.plots import SIZE
+from ..evaluation.reporting.plots import INK, NO_METADATA, SERIES, SIZE, STYLE, VARIABLES
 from ..evaluation.reporting.svg import for_page
 from .summary import SizeRates
 
-_INK, _GRID = "#010203", "#010204"  # stand-ins that become variables of the page
-_SERIES = tuple(f"#0102{16 + number:02x}" for number in range(7))
-_VARIABLES = {_INK: "--ink", _GRID: "--grid"} | {c: f"--series-{n}" for n, c in enumerate(_SERIES, start=1)}
-_STYLE: dict[Any, Any] = {
-    "svg.fonttype": "none",
-    "text.parse_math": False,  # a name may hold a dollar sign
-    "font.size": 9.0,
-    "text.color": _INK,
-    "axes.edgecolor": _INK,
-    "axes.labelcolor": _INK,
-    "axes.linewidth": 0.6,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.axisbelow": True,
-    "xtick.color": _INK,
-    "ytick.color": _INK,
-    "grid.color": _GRID,
-    "grid.linewidth": 0.6,
-}
-_NO_METADATA = {"Date": None, "Creator": None, "Format": None, "Type": None}
+_STYLE: dict[Any, Any] = {**STYLE, "text.color": INK}
 _FINE = np.linspace(0.0, 1.0, 101)
 
 
@@ -62,15 +43,15 @@ def draw_scores(model: ScoreModel, row: int, part: int, votes: np.ndarray, key: 
     def fill(figure: Figure) -> None:
         axes, below = figure.subplots(2, 1, sharex=True, height_ratios=(4, 1))
         axes.grid(True)
-        axes.fill_between(_FINE, *_band(mean, sigma), color=_SERIES[0], alpha=0.2, linewidth=0)
-        axes.plot(_FINE, mean, color=_SERIES[0], linewidth=1.5)
-        axes.fill_between([0.0, 1.0], *_band(false, false_sigma), color=_SERIES[1], alpha=0.16, linewidth=0)
-        axes.plot([0.0, 1.0], [false, false], color=_SERIES[1], linewidth=1.5, linestyle=(0, (4, 1.4)))
-        axes.axvline(TRUNCATION, color=_INK, linewidth=0.9, linestyle=(0, (1.5, 1.5)))
+        axes.fill_between(_FINE, *_band(mean, sigma), color=SERIES[0], alpha=0.2, linewidth=0)
+        axes.plot(_FINE, mean, color=SERIES[0], linewidth=1.5)
+        axes.fill_between([0.0, 1.0], *_band(false, false_sigma), color=SERIES[1], alpha=0.16, linewidth=0)
+        axes.plot([0.0, 1.0], [false, false], color=SERIES[1], linewidth=1.5, linestyle=(0, (4, 1.4)))
+        axes.axvline(TRUNCATION, color=INK, linewidth=0.9, linestyle=(0, (1.5, 1.5)))
         axes.set(ylabel="score", xlim=(-0.01, 1.01), ylim=(-0.01, 1.01))
         below.set(xlabel="occluded share", ylabel="votes", yscale="log", ylim=(0.5, 2.0 * max(float(votes.max()), 5.0)))
         voted = votes > 0.5
-        below.bar(BIN_CENTRES[voted], votes[voted], width=0.09, color=_SERIES[6], alpha=0.75, linewidth=0)
+        below.bar(BIN_CENTRES[voted], votes[voted], width=0.09, color=SERIES[6], alpha=0.75, linewidth=0)
         below.yaxis.set_major_formatter(lambda count, _: f"{count:g}")  # matplotlib's own needs its math text
         below.yaxis.set_minor_locator(NullLocator())
 
@@ -86,7 +67,7 @@ def draw_rates(rates: Sequence[SizeRates], key: str, label: str) -> str:
     def fill(figure: Figure) -> None:
         axes = figure.subplots()
         axes.grid(True)
-        for rate, color in zip(rates, cycle(_SERIES), strict=False):
+        for rate, color in zip(rates, cycle(SERIES), strict=False):
             axes.plot(rate.share, rate.curve, color=color, linewidth=1.5)
             area = 4.0 + 26.0 * np.minimum(rate.trials / 100.0, 1.0)
             axes.scatter(rate.visible, rate.rate, s=area, color=color, linewidth=0, alpha=0.7)
@@ -106,5 +87,5 @@ def _picture(fill: Callable[[Figure], None], key: str, label: str) -> str:
         figure = Figure(figsize=SIZE, layout="constrained")
         fill(figure)
         buffer = io.StringIO()
-        figure.savefig(buffer, format="svg", transparent=True, metadata=_NO_METADATA)
-    return for_page(buffer.getvalue(), key, label, _VARIABLES)
+        figure.savefig(buffer, format="svg", transparent=True, metadata=NO_METADATA)
+    return for_page(buffer.getvalue(), key, label, VARIABLES)

@@ -27,29 +27,29 @@ DASHES = ("", "6 2", "2 2", "7 2 2 2")  # differ where colours cannot: on paper,
 MARKERS = ("o", "x", "^", "+")
 COLORS = 7  # variables --series-1 ... of the style sheet, in an order that the colour-blind can tell apart
 
-_INK, _GRID = "#010203", "#010204"  # stand-ins that no palette has; replaced by variables after drawing
-_SERIES = tuple(f"#0102{16 + number:02x}" for number in range(COLORS))
-_VARIABLES = {_INK: "--ink", _GRID: "--grid"} | {c: f"--series-{n}" for n, c in enumerate(_SERIES, start=1)}
-_STYLE = {
+INK, GRID = "#010203", "#010204"  # stand-ins that no palette has; replaced by variables after drawing
+SERIES = tuple(f"#0102{16 + number:02x}" for number in range(COLORS))
+VARIABLES = {INK: "--ink", GRID: "--grid"} | {c: f"--series-{n}" for n, c in enumerate(SERIES, start=1)}
+STYLE = {
     "svg.fonttype": "none",
     "text.parse_math": False,  # a label may hold a dollar sign
     "font.size": 9.0,
-    "axes.edgecolor": _INK,
-    "axes.labelcolor": _INK,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
     "axes.linewidth": 0.6,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.axisbelow": True,
-    "xtick.color": _INK,
-    "ytick.color": _INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
-    "grid.color": _GRID,
+    "grid.color": GRID,
     "grid.linewidth": 0.6,
     "axes.formatter.useoffset": False,
     "path.simplify_threshold": 0.2,  # pixels at 72 to the inch
 }
-_NO_METADATA = {"Date": None, "Creator": None, "Format": None, "Type": None}
+NO_METADATA = {"Date": None, "Creator": None, "Format": None, "Type": None}
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ def draw(plot: Plot, key: str) -> str | None:
     """
     if not any(_finite(series).any() for series in plot.series):
         return None
-    style: dict[Any, Any] = {**_STYLE, "svg.hashsalt": key}
+    style: dict[Any, Any] = {**STYLE, "svg.hashsalt": key}
     with rc_context(style):
         figure = Figure(figsize=SQUARE if plot.equal else SIZE, layout="constrained")
         axes = figure.subplots()
@@ -90,9 +90,9 @@ def draw(plot: Plot, key: str) -> str | None:
             _draw_series(axes, series, number, list(_bars_beside(plot)))
         _frame(axes, plot)
         buffer = io.StringIO()
-        figure.savefig(buffer, format="svg", transparent=True, metadata=_NO_METADATA)
+        figure.savefig(buffer, format="svg", transparent=True, metadata=NO_METADATA)
     label = f"{plot.title}: {plot.y_label} over {plot.x_label}"
-    return for_page(buffer.getvalue(), key, label, _VARIABLES)
+    return for_page(buffer.getvalue(), key, label, VARIABLES)
 
 
 def _frame(axes: Axes, plot: Plot) -> None:
@@ -131,7 +131,7 @@ def _whole(values: np.ndarray) -> bool:
 
 
 def _draw_series(axes: Axes, series: Series, number: int, bars: list[Series]) -> None:
-    color = _SERIES[number % COLORS]
+    color = SERIES[number % COLORS]
     x, y = np.asarray(series.x, dtype=np.float64), np.asarray(series.y, dtype=np.float64)
     if series.kind is PlotKind.BARS:
         width = (1.0 if len(bars) == 1 else 0.88) * _bar_width(bars) / len(bars)
