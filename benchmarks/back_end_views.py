@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from thingmap.factors.evidence_model import generic_evidence_model
 from thingmap.mapper.config import LiftingConfig, UpConfig, VisualConfig
 from thingmap.mapper.estimation.lifting import LiftedDetection
-from thingmap.mapper.trajectory.odometry import inverse
+from thingmap.mapper.trajectory.rigid import inverse
 
 ODOMETRY_SIGMAS = np.repeat([0.002, 0.004], 3)  # rad, m: one keyframe step of KISS-ICP on hand-held RGB-D
 MIN_IN_IMAGE = 0.4  # share of a box in the image below which a detector does not respond

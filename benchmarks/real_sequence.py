@@ -27,7 +27,7 @@ from thingmap.mapper.config import MapperConfig, OdometryConfig
 from thingmap.mapper.config_file import load_config
 from thingmap.mapper.mapper import SemanticMapper
 from thingmap.mapper.runner import run_sequence
-from thingmap.mapper.trajectory.odometry import KissOdometry
+from thingmap.mapper.trajectory.kiss_odometry import KissOdometry
 
 KNOWN_OBJECTS = "objects_derived.json"
 
@@ -78,7 +78,7 @@ def register_all(sequence: Sequence, config: OdometryConfig) -> tuple[np.ndarray
     odometry, stamps, poses = KissOdometry(config), [], []
     for frame in usable_frames(sequence, lambda broken: None):
         try:
-            poses.append(odometry.register(frame))
+            poses.append(odometry.register(frame).T_odometry_camera)
             stamps.append(frame.stamp)
         except BrokenFrame:
             continue

@@ -11,8 +11,9 @@ from ..estimation.smoother import Smoother
 from ..estimation.view import View
 from ..map.object_map import MapFrame, UpDirection
 from ..map.upright import upright_rotation
+from .features import FeatureExtractor
 from .keyframes import FrameTrajectory, KeyframeSelector
-from .odometry import make_odometry
+from .odometry_sources import make_odometry
 from .up import UpMeasurement, camera_prior, from_accelerometer, from_planes
 from .visual import VisualOdometry
 
@@ -35,6 +36,7 @@ class CameraGraph:
         self.map_frame = MapFrame.DATASET if given else MapFrame.FIRST_CAMERA
         self._odometry = make_odometry(config.odometry)
         self._visual = VisualOdometry(config.visual, config.seed) if config.visual.enabled and not given else None
+        self._features = FeatureExtractor(config.visual)
         self._selector = KeyframeSelector(config.keyframes)
         self._frames = FrameTrajectory()
         self._T_odometry_camera = np.eye(4)
@@ -66,7 +68,7 @@ class CameraGraph:
         """
         if self.started and frame.intrinsics != self.intrinsics:
             raise BrokenFrame(frame.name, FrameProblem.OTHER_CAMERA)
-        self._T_odometry_camera = self._odometry.register(frame)
+        self._T_odometry_camera = self._odometry.register(frame).T_odometry_camera
         if self._selector.is_keyframe(self._T_odometry_camera) or not self.started:
             return True
         last = self.smoother.keyframes - 1
@@ -83,8 +85,8 @@ class CameraGraph:
             number = self.smoother.add_keyframe(step.T_a_b, step.covariance)
         self._T_keyframe_camera = self._frames.append(frame.stamp, self._T_odometry_camera, number, True)
         if self._visual is not None:
-            for edge in self._visual.add_keyframe(frame, number):
-                self.smoother.add(Visual(edge.a, edge.b, edge.T_a_b, edge.covariance))
+            for edge in self._visual.add_keyframe(number, self._features(frame)):
+                self.smoother.add(Visual(edge.a, edge.b, edge.motion.T_a_b, edge.motion.covariance))
         self._measure_up(frame, number, T_world_camera)
         return View(frame, number, T_world_camera, self.smoother.R_world_upright)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..config import KeyframeConfig
-from .odometry import inverse, rotation_angle
+from .rigid import inverse, rotation_angle
 
 
 class KeyframeSelector:

@@ -13,7 +13,7 @@ from back_end_world import CLASSES, World, make_world
 from throughput import main
 
 from thingmap.mapper.config import VisualConfig
-from thingmap.mapper.trajectory.odometry import inverse
+from thingmap.mapper.trajectory.rigid import inverse
 
 KEYFRAMES, LAPS = 40, 0.16
 

@@ -13,15 +13,12 @@ from scipy.spatial.transform import Rotation
 
 from thingmap.datasets.frame import BrokenFrame, Frame, FrameProblem
 from thingmap.mapper.config import KeyframeConfig, OdometryConfig, OdometrySource
+from thingmap.mapper.trajectory.given_odometry import PoseOdometry
 from thingmap.mapper.trajectory.keyframes import KeyframeSelector
-from thingmap.mapper.trajectory.odometry import (
-    KissOdometry,
-    OdometryStep,
-    PoseOdometry,
-    inverse,
-    make_odometry,
-    rotation_angle,
-)
+from thingmap.mapper.trajectory.kiss_odometry import KissOdometry
+from thingmap.mapper.trajectory.odometry import OdometryStep
+from thingmap.mapper.trajectory.odometry_sources import make_odometry
+from thingmap.mapper.trajectory.rigid import inverse, rotation_angle
 
 SMALL = OdometryConfig(pixel_step=1, threads=1)  # for the 160 x 120 depth camera
 WALL = [((0.0, 0.0, 1.0), 1.5)]
@@ -70,7 +67,7 @@ def tracked(tabletop) -> tuple[list[np.ndarray], list[tuple[Frame, Frame, Odomet
     odometry, selector = KissOdometry(OdometryConfig()), KeyframeSelector(KeyframeConfig())
     poses, steps, last = [], [], None
     for frame in tabletop:
-        poses.append(odometry.register(frame))
+        poses.append(odometry.register(frame).T_odometry_camera)
         if selector.is_keyframe(poses[-1]):
             step = odometry.keyframe()
             assert (step is None) == (last is None)
@@ -105,10 +102,10 @@ def test_steps_between_keyframes_are_as_uncertain_as_they_are_wrong(tracked):
 
 def test_a_step_is_the_motion_between_the_registered_poses(tabletop):
     odometry = KissOdometry(OdometryConfig())
-    first = odometry.register(tabletop[0])
+    first = odometry.register(tabletop[0]).T_odometry_camera
     assert odometry.keyframe() is None
     for frame in tabletop[1:4]:
-        last = odometry.register(frame)
+        last = odometry.register(frame).T_odometry_camera
     step = odometry.keyframe()
     assert step is not None
     np.testing.assert_allclose(step.T_a_b, inverse(first) @ last, atol=1e-12)
@@ -122,7 +119,7 @@ def test_the_same_frames_give_the_same_path_with_any_number_of_threads(tabletop)
             odometry.register(frame)
         odometry.keyframe()
         for frame in tabletop[4:8]:
-            pose = odometry.register(frame)
+            pose = odometry.register(frame).T_odometry_camera
         step = odometry.keyframe()
         assert step is not None
         runs.append((pose, step.T_a_b, step.covariance))
@@ -153,8 +150,8 @@ def test_a_frame_without_depth_in_range_is_broken_and_changes_nothing(plane_fram
     plain, disturbed = KissOdometry(SMALL), KissOdometry(SMALL)
     for index in range(6):
         frame = plane_frame(CORNER, transform([0.0, 0.004 * index, 0.0], [0.005 * index, 0.0, 0.0]), index)
-        expected = plain.register(frame)
-        np.testing.assert_array_equal(disturbed.register(frame), expected)
+        expected = plain.register(frame).T_odometry_camera
+        np.testing.assert_array_equal(disturbed.register(frame).T_odometry_camera, expected)
         for depth in (0.0, 0.2, 9.0, np.nan):
             with pytest.raises(BrokenFrame, match="0 readings in range") as broken:
                 disturbed.register(replace(frame, depth=np.full_like(frame.depth, depth)))
@@ -187,7 +184,7 @@ def test_readings_out_of_range_are_left_out(plane_frame):
         for frame in frames:
             depth = frame.depth.copy()
             depth[:30] = 5.0 if far else 0.0
-            pose = odometry.register(replace(frame, depth=depth))
+            pose = odometry.register(replace(frame, depth=depth)).T_odometry_camera
         poses.append(pose)
     np.testing.assert_array_equal(poses[0], poses[1])
 
@@ -201,10 +198,10 @@ def with_pose(frame: Frame, T: np.ndarray | None) -> Frame:
 def test_given_poses_are_measurements_of_the_motion_between_them(plane_frame, rotation_a, a, rotation_b, b):
     frame, odometry = plane_frame(WALL), PoseOdometry(POSES)
     T_a, T_b = transform(rotation_a, a), transform(rotation_b, b)
-    np.testing.assert_array_equal(odometry.register(with_pose(frame, T_a)), T_a)
+    np.testing.assert_array_equal(odometry.register(with_pose(frame, T_a)).T_odometry_camera, T_a)
     assert odometry.keyframe() is None
     odometry.register(with_pose(frame, np.eye(4)))  # not a keyframe
-    np.testing.assert_array_equal(odometry.register(with_pose(frame, T_b)), T_b)
+    np.testing.assert_array_equal(odometry.register(with_pose(frame, T_b)).T_odometry_camera, T_b)
     step = odometry.keyframe()
     assert step is not None
     np.testing.assert_allclose(T_a @ step.T_a_b, T_b, atol=1e-12)

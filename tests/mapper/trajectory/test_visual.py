@@ -13,7 +13,10 @@ from scipy.spatial.transform import Rotation
 
 from thingmap.datasets.frame import Frame
 from thingmap.mapper.config import VisualConfig
-from thingmap.mapper.trajectory.visual import VisualEdge, VisualOdometry, _Features, rigid_motion
+from thingmap.mapper.trajectory.feature_motion import RelativePose, relative_pose
+from thingmap.mapper.trajectory.features import FeatureExtractor, Features
+from thingmap.mapper.trajectory.rigid import rigid_motion
+from thingmap.mapper.trajectory.visual import VisualOdometry
 
 NO_FLOOR = VisualConfig(covariance_floor=(0.0, 0.0))
 
@@ -35,10 +38,12 @@ def scene(rng: np.random.Generator, count: int) -> np.ndarray:
     return np.c_[rng.uniform(-0.5, 0.5, (count, 2)) * z[:, None], z]
 
 
-def edge_between(old: np.ndarray, new: np.ndarray, config: VisualConfig = NO_FLOOR, seed: int = 0) -> VisualEdge | None:
-    """The edge that points in a keyframe and the same points in the next give; row i matches row i."""
+def motion_between(
+    old: np.ndarray, new: np.ndarray, config: VisualConfig = NO_FLOOR, seed: int = 0
+) -> RelativePose | None:
+    """The motion that points in a keyframe and the same points in the next give; row i matches row i."""
     descriptors = np.random.default_rng(99).integers(0, 256, (len(old), 32), dtype=np.uint8)
-    return VisualOdometry(config, seed)._relative(_Features(4, descriptors, old), _Features(5, descriptors, new))
+    return relative_pose(Features(descriptors, old), Features(descriptors, new), config, seed)
 
 
 def tangent(T: np.ndarray, truth: np.ndarray) -> np.ndarray:
@@ -100,7 +105,7 @@ def test_the_motion_is_found_among_forty_percent_of_wrong_matches(seed):
     old = moved(T, new) + 0.003 * new[:, 2:] * rng.normal(size=(150, 3))
     wrong = rng.permutation(150)[:60]
     old[wrong] = scene(rng, 60)
-    edge = edge_between(old, new)
+    edge = motion_between(old, new)
     assert edge is not None and (edge.a, edge.b) == (4, 5)
     assert 85 <= edge.inliers <= 95
     error = tangent(edge.T_a_b, T)
@@ -114,18 +119,18 @@ def test_near_points_count_for_more():
     new[:, 2] = np.where(np.arange(100) < 50, 0.8, 3.0)
     old = new.copy()
     old[50:, 2] += 0.04
-    edge = edge_between(old, new)
+    edge = motion_between(old, new)
     assert edge is not None and edge.inliers == 100
     assert 0.0 < edge.T_a_b[2, 3] < 0.01
 
 
 def test_matches_that_agree_on_nothing_give_no_edge():
     rng = np.random.default_rng(2)
-    assert edge_between(scene(rng, 200), scene(rng, 200)) is None
+    assert motion_between(scene(rng, 200), scene(rng, 200)) is None
     few = scene(rng, NO_FLOOR.min_inliers - 1)
-    assert edge_between(few, few) is None
+    assert motion_between(few, few) is None
     enough = scene(rng, NO_FLOOR.min_inliers)
-    assert edge_between(enough, enough) is not None
+    assert motion_between(enough, enough) is not None
 
 
 def test_the_covariance_is_that_of_many_noisy_fits():
@@ -135,7 +140,7 @@ def test_the_covariance_is_that_of_many_noisy_fits():
     errors, squares, predicted = [], [], []
     for _ in range(150):
         old = moved(T, new) + 0.002 * moved(T, new)[:, 2:] * rng.normal(size=new.shape)
-        edge = edge_between(old, new)
+        edge = motion_between(old, new)
         assert edge is not None
         errors.append(tangent(edge.T_a_b, T))
         squares.append(errors[-1] @ np.linalg.solve(edge.covariance, errors[-1]) / 6.0)
@@ -152,13 +157,17 @@ def test_the_covariance_is_that_of_many_noisy_fits():
 def test_an_edge_is_never_surer_than_the_floor():
     rng = np.random.default_rng(4)
     points, config = scene(rng, 300), VisualConfig()
-    edge = edge_between(points, points, config)
+    edge = motion_between(points, points, config)
     assert edge is not None
     np.testing.assert_allclose(edge.covariance, edge.covariance.T, atol=1e-15)
     np.testing.assert_allclose(np.sqrt(np.diag(edge.covariance)), np.repeat(config.covariance_floor, 3), rtol=0.02)
 
 
 # -- images
+
+
+def extract(frame: Frame) -> Features:
+    return FeatureExtractor(VisualConfig())(frame)
 
 
 def true_motion(a: Frame, b: Frame) -> np.ndarray:
@@ -170,21 +179,21 @@ def test_edges_between_rendered_frames_are_close_to_the_truth(tabletop):
     chosen = list(tabletop[::7])
     visual = VisualOdometry(VisualConfig(), 0)
     for number, frame in enumerate(chosen):
-        edges = visual.add_keyframe(frame, number)
+        edges = visual.add_keyframe(number, extract(frame))
         assert [(e.a, e.b) for e in edges] == ([(number - 1, number)] if number else [])
         for edge in edges:
             truth = true_motion(chosen[edge.a], chosen[edge.b])
-            error = tangent(edge.T_a_b, truth)
-            assert edge.inliers > 150
+            error = tangent(edge.motion.T_a_b, truth)
+            assert edge.motion.inliers > 150
             assert np.linalg.norm(truth[:3, 3]) > 0.05
             assert np.linalg.norm(error[:3]) < np.radians(0.3) and np.linalg.norm(error[3:]) < 0.008
-            assert error @ np.linalg.solve(edge.covariance, error) / 6.0 < 3.0
-            np.linalg.cholesky(edge.covariance)
+            assert error @ np.linalg.solve(edge.motion.covariance, error) / 6.0 < 3.0
+            np.linalg.cholesky(edge.motion.covariance)
 
 
 def test_a_new_keyframe_is_measured_against_as_many_as_asked_for(tabletop):
     visual = VisualOdometry(VisualConfig(neighbours=2), 0)
-    found = [[(e.a, e.b) for e in visual.add_keyframe(f, i)] for i, f in enumerate(tabletop[:9:3])]
+    found = [[(e.a, e.b) for e in visual.add_keyframe(i, extract(f))] for i, f in enumerate(tabletop[:9:3])]
     assert found == [[], [(0, 1)], [(0, 2), (1, 2)]]
 
 
@@ -192,8 +201,8 @@ def test_the_same_images_give_the_same_edge(tabletop):
     runs = []
     for _ in range(2):
         visual = VisualOdometry(VisualConfig(), 7)
-        visual.add_keyframe(tabletop[0], 0)
-        runs.append(visual.add_keyframe(tabletop[6], 1)[0])
+        visual.add_keyframe(0, extract(tabletop[0]))
+        runs.append(visual.add_keyframe(1, extract(tabletop[6]))[0].motion)
     np.testing.assert_array_equal(runs[0].T_a_b, runs[1].T_a_b)
     np.testing.assert_array_equal(runs[0].covariance, runs[1].covariance)
     assert runs[0].inliers == runs[1].inliers
@@ -214,7 +223,7 @@ def without_depth(frame: Frame) -> Frame:
 @pytest.mark.parametrize("spoil", [blank, out_of_range, without_depth])
 def test_without_features_or_their_depth_there_is_no_edge(tabletop, spoil):
     visual = VisualOdometry(VisualConfig(), 0)
-    assert visual.add_keyframe(tabletop[0], 0) == []
-    assert visual.add_keyframe(spoil(tabletop[3]), 1) == []
-    assert visual.add_keyframe(tabletop[6], 2) == []  # its only neighbour has nothing to match
-    assert len(visual.add_keyframe(tabletop[9], 3)) == 1
+    assert visual.add_keyframe(0, extract(tabletop[0])) == []
+    assert visual.add_keyframe(1, extract(spoil(tabletop[3]))) == []
+    assert visual.add_keyframe(2, extract(tabletop[6])) == []  # its only neighbour has nothing to match
+    assert len(visual.add_keyframe(3, extract(tabletop[9]))) == 1

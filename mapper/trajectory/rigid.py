@@ -1,0 +1,41 @@
+"""Rigid transforms as (4, 4) matrices, and the one that takes one point set to another."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def inverse(T: np.ndarray) -> np.ndarray:
+    """Inverse of a (4, 4) rigid transform."""
+    R, t = T[:3, :3], T[:3, 3]
+    result = np.eye(4)
+    result[:3, :3], result[:3, 3] = R.T, -R.T @ t
+    return result
+
+
+def rotation_angle(R: np.ndarray) -> float:
+    """Angle of a (3, 3) rotation, rad."""
+    return float(np.arccos(np.clip((np.trace(R) - 1.0) / 2.0, -1.0, 1.0)))
+
+
+def rigid_motion(source: np.ndarray, target: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Weighted least-squares motion that takes `source` to `target` (Umeyama 1991, without scale).
+
+    Args:
+        source, target: (..., N, 3) metres; leading axes are independent problems.
+        weights: (..., N).
+
+    Returns:
+        (..., 4, 4) with target ≈ R source + t.
+    """
+    w = (weights / weights.sum(axis=-1, keepdims=True))[..., None]
+    mean_source, mean_target = (w * source).sum(axis=-2), (w * target).sum(axis=-2)
+    H = np.swapaxes(w * (target - mean_target[..., None, :]), -1, -2) @ (source - mean_source[..., None, :])
+    U, _, Vt = np.linalg.svd(H)
+    sign = np.ones((*H.shape[:-2], 3))
+    sign[..., 2] = np.sign(np.linalg.det(U @ Vt))
+    T = np.zeros((*H.shape[:-2], 4, 4))
+    T[..., :3, :3] = (U * sign[..., None, :]) @ Vt
+    T[..., :3, 3] = mean_target - np.einsum("...ij,...j->...i", T[..., :3, :3], mean_source)
+    T[..., 3, 3] = 1.0
+    return T
