@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from results import show_section
-from suite import VARIANTS, WHOLE, Scene, Variant, scenes
+from suite import PRESETS, VARIANTS, WHOLE, Scene, Variant, scenes
 from suite_job import is_rendered, judge, read_judgement, render
 from suite_report import COST_COLUMNS, IMAGE_COLUMNS, OBJECT_COLUMNS, Row, honesty_table, metric_table, next_view_table
 
@@ -90,7 +90,7 @@ def _show(
 
 def _by_preset(whole: list[Scene], folder: Path) -> Iterable[Row]:
     """What the whole mapper made of the scenes of each preset and clutter level."""
-    for preset, clutter in itertools.product(Preset, ClutterLevel):
+    for preset, clutter in itertools.product(PRESETS, ClutterLevel):
         group = [scene for scene in whole if (scene.preset, scene.clutter) == (preset, clutter)]
         if group:
             yield (preset.value, clutter.value), [read_judgement(scene, WHOLE, folder) for scene in group]
@@ -115,7 +115,7 @@ def _cost_note(jobs: int) -> str:
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    add, presets, names = parser.add_argument, [preset.value for preset in Preset], [v.name for v in VARIANTS]
+    add, presets, names = parser.add_argument, [preset.value for preset in PRESETS], [v.name for v in VARIANTS]
     add("--presets", nargs="+", choices=presets, default=presets, help="only these (default: all)")
     add("--variants", nargs="+", choices=names, default=names, help="only these mappers (default: all)")
     add("--quick", action="store_true", help=f"one scene each, of at most {QUICK_FRAMES} frames; not for RESULTS.md")

@@ -8,6 +8,7 @@ from typing import Any
 from thingmap.datasets.synthetic.config import ClutterLevel, Preset, SyntheticConfig
 from thingmap.mapper.config import MapperConfig, OdometrySource
 
+PRESETS = (Preset.TABLETOP, Preset.SURVEY, Preset.KITCHEN, Preset.LAPS)
 FIRST_SEED = 1000  # far from the seeds that anything was tried or tuned on
 SEEDS = {Preset.TABLETOP: 2, Preset.SURVEY: 5, Preset.KITCHEN: 1, Preset.LAPS: 1}  # scenes of each clutter level
 FRAMES = {Preset.TABLETOP: 300, Preset.SURVEY: 37, Preset.KITCHEN: 900, Preset.LAPS: 1800}
@@ -61,10 +62,10 @@ class Variant:
         return replace(whole, **{self.section: replace(getattr(whole, self.section), **{self.key: self.value})})
 
 
-WHOLE = Variant("full", "whole", presets=tuple(Preset))
+WHOLE = Variant("full", "whole", presets=PRESETS)
 VARIANTS = (
     WHOLE,
-    Variant("poses", "whole, poses given", "odometry", "source", OdometrySource.POSES, tuple(Preset)),
+    Variant("poses", "whole, poses given", "odometry", "source", OdometrySource.POSES, PRESETS),
     Variant("no-occlusion", "without occlusion weighting", "evidence", "occlusion", False),
     Variant("no-misses", "without missed-detection evidence", "evidence", "misses", False),
     Variant("no-coupling", "without class-size coupling", "beliefs", "size_coupling", False),

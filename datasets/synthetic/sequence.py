@@ -158,7 +158,7 @@ class SyntheticSequence(RenderedSequence):
 
     def __init__(self, config: SyntheticConfig) -> None:
         self.config = config
-        stamps, poses = camera_path(config.preset, config.frame_count + 1, config.seed)
+        stamps, poses = camera_path(config.preset, config.frame_count + 1, config.seed, config.pace)
         super().__init__(
             name=synth_line(config),
             scene=build_scene(config),

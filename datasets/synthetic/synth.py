@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 PREFIX = "synth:"
 NUMBERS = ("seed", "objects", "frames", "width", "blur")
-PARAMETERS = ("seed", "objects", "clutter", "frames", "width", "meshes", "blur", "without")
+PARAMETERS = ("seed", "objects", "clutter", "frames", "width", "meshes", "blur", "pace", "without")
 BOUNDARY = re.compile(r"&(?=[a-z_]+=)")  # an & that no parameter follows belongs to a folder's name
 
 
@@ -43,7 +43,7 @@ def parse_synth(name: str) -> SyntheticConfig:
 
     Args:
         name: a preset, or with parameters as
-            `tabletop?seed=3&objects=20&clutter=high&frames=150&width=640&meshes=FOLDER&blur=4&without=axial+shadow`;
+            `tabletop?seed=3&objects=20&clutter=high&frames=150&width=640&meshes=FOLDER&blur=4&pace=2.5&without=axial+shadow`;
             a leading `synth:` is allowed. `without` names effects of the depth sensor to switch off, `all` for a
             sensor that reads the truth. Characters of FOLDER may be percent-encoded; they have to be where `&` and
             a word with `=` follow each other in it. Everything else is as in `SyntheticConfig`.
@@ -76,6 +76,7 @@ def synth_line(config: SyntheticConfig) -> str:
         "width": config.width if config.width != 640 else None,
         "meshes": quote(str(config.meshes)) if config.meshes is not None else None,
         "blur": config.blur if config.blur > 1 else None,
+        "pace": _plainly(config.pace) if config.pace != 1.0 else None,
         "without": _switched_off(config.sensor) or None,
     }
     words = [f"{key}={value}" for key, value in changed.items() if value is not None]
@@ -96,6 +97,11 @@ def _value(base: str, key: str, text: str) -> Any:
             return int(text)
         except ValueError:
             expected = f"a whole number for {key}"
+    elif key == "pace":
+        try:
+            return float(text)
+        except ValueError:
+            expected = "a number for pace"
     elif key == "clutter":
         if text in list(ClutterLevel):
             return ClutterLevel(text)
@@ -121,6 +127,11 @@ def _folder(text: str) -> Path:
 
 def _sensor_without(effects: tuple[str, ...]) -> DepthSensor:
     return IDEAL if "all" in effects else replace(DepthSensor(), **dict.fromkeys(effects, False))
+
+
+def _plainly(number: float) -> str:
+    """With all its digits, and without a point where it is whole."""
+    return repr(float(number)).removesuffix(".0")
 
 
 def _switched_off(sensor: DepthSensor) -> str:

@@ -26,6 +26,7 @@ class PresetName(StrEnum):
     SURVEY = "survey"
     KITCHEN = "kitchen"
     LAPS = "laps"
+    WALL = "wall"
 
 
 class Clutter(StrEnum):
@@ -48,6 +49,7 @@ def synth(
         Path | None, typer.Option(metavar="DIR", help="Folder of textured OBJ or GLB scans to take as objects.")
     ] = None,
     blur: Annotated[int, typer.Option(metavar="N", help="Renderings averaged for motion blur; 0 for none.")] = 0,
+    pace: Annotated[float, typer.Option(metavar="X", help="How many times as fast the camera goes.")] = 1.0,
     without: Annotated[
         str | None,
         typer.Option(metavar="EFFECTS", help="Effects of the depth sensor to leave out: axial,shadow or all."),
@@ -64,7 +66,7 @@ def synth(
     from ...datasets.synthetic.files.written_folder import check_target
 
     check_target(output, overwrite)
-    config = _config(preset, without, objects, clutter, seed, frames, width, meshes, blur)
+    config = _config(preset, without, objects, clutter, seed, frames, width, meshes, blur, pace)
     from ...datasets.synthetic.files.writing import write_sequence
     from ...datasets.synthetic.sequence import SyntheticSequence
 
@@ -87,6 +89,7 @@ def _config(
     width: int,
     meshes: Path | None,
     blur: int,
+    pace: float,
 ) -> SyntheticConfig:
     """The options as a configuration; raises `UserError` where one is outside its limits."""
     from dataclasses import replace
@@ -95,7 +98,7 @@ def _config(
     from ...datasets.synthetic.synth import parse_synth
 
     start = parse_synth(preset if without is None else f"{preset}?without={without}")
-    numbers = {"objects": objects, "seed": seed, "frames": frames, "width": width, "blur": blur}
+    numbers = {"objects": objects, "seed": seed, "frames": frames, "width": width, "blur": blur, "pace": pace}
     return replace(start, clutter=ClutterLevel(clutter), meshes=meshes, **numbers)
 
 

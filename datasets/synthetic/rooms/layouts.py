@@ -14,6 +14,7 @@ from .room import CABINET, CABINET_AT, ROOM, TABLE_HEIGHT, TABLE_TOP, room
 from .storage import open_shelf
 from .survey_room import survey_room
 from .two_rooms import two_rooms
+from .wall_room import wall_room
 
 
 def build_layout(preset: Preset, rng: np.random.Generator) -> Layout:
@@ -25,6 +26,8 @@ def build_layout(preset: Preset, rng: np.random.Generator) -> Layout:
             return survey_room(rng)
         case Preset.KITCHEN | Preset.LAPS:
             return two_rooms(rng)
+        case Preset.WALL:
+            return wall_room(rng)
 
 
 def tabletop(rng: np.random.Generator) -> Layout:

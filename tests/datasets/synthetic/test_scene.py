@@ -84,7 +84,7 @@ def test_scenes_follow_their_seed():
 
 def test_a_scene_does_not_depend_on_how_it_is_filmed():
     config = SyntheticConfig(seed=1)
-    assert build_scene(config) is build_scene(replace(config, frames=7, width=160, blur=2))
+    assert build_scene(config) is build_scene(replace(config, frames=7, width=160, blur=2, pace=3.0))
 
 
 def write_ball(folder, name: str, radius: float) -> None:

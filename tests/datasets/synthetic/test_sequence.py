@@ -6,6 +6,7 @@ import pickle
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -122,7 +123,14 @@ def test_frames_depend_on_the_configuration_and_the_index_only(tabletop):
 def test_a_longer_sequence_begins_with_the_same_frames(preset):
     short, longer = (
         SyntheticSequence(
-            SyntheticConfig(preset, objects=3, width=64, frames=frames, blur=2 * (preset != Preset.SURVEY))
+            SyntheticConfig(
+                preset,
+                objects=None if preset is Preset.WALL else 3,
+                width=64,
+                frames=frames,
+                blur=2 * (preset is not Preset.SURVEY),
+                pace=1.0 if preset is Preset.SURVEY else 1.7,
+            )
         )
         for frames in (4, 9)
     )
@@ -135,6 +143,47 @@ def test_a_longer_sequence_begins_with_the_same_frames(preset):
 def test_a_camera_that_stands_still_blurs_nothing():
     with pytest.raises(UserError, match="stands still, found blur 2"):
         SyntheticConfig(Preset.SURVEY, blur=2)
+    with pytest.raises(UserError, match="stands still, found pace 3"):
+        SyntheticConfig(Preset.SURVEY, pace=3)
+
+
+def test_at_a_pace_the_same_scene_is_filmed_from_farther_on():
+    usual, fast = (SyntheticSequence(replace(SMALL, pace=pace, sensor=IDEAL)) for pace in (1.0, 3.0))
+    assert fast.scene is usual.scene
+    np.testing.assert_array_equal(fast.stamps, usual.stamps)
+    np.testing.assert_allclose(fast[5].depth, usual[15].depth, atol=1e-4)
+    np.testing.assert_array_equal(fast[0].color, usual[0].color)
+    assert np.abs(fast[5].depth - usual[5].depth).mean() > 0.01
+
+
+def test_the_wall_is_one_plane_with_pictures_on_it():
+    wall = SyntheticSequence(SyntheticConfig(Preset.WALL, width=160, frames=190))
+    assert wall.objects == wall.clutter == () and (wall.instances(3) == NO_OBJECT).all()
+    assert len(wall.truth(3).object_id) == 0
+    for index in (0, 90, 189):
+        frame = wall[index]
+        uv = np.stack(np.meshgrid(np.arange(160.0), np.arange(120.0)), axis=-1).reshape(-1, 2)
+        camera = wall.intrinsics.back_project(uv, wall.true_depth(index).ravel().astype(float))
+        world = camera @ frame.T_world_camera[:3, :3].T + frame.T_world_camera[:3, 3]
+        np.testing.assert_allclose(world[..., 1], 1.2, atol=1e-5)
+        assert (frame.depth > 0).mean() > 0.95 and 1.0 < np.median(frame.depth) < 1.4
+        assert 60 < frame.color.mean() < 210 and np.mean(frame.color >= 250) < 0.1
+    cloud = wall.point_truth()
+    assert (cloud.object_id == NO_OBJECT).all() and np.ptp(cloud.points[:, 1]) < 1e-4
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_the_wall_s_prints_have_features_all_the_way(seed):
+    wall = SyntheticSequence(SyntheticConfig(Preset.WALL, seed=seed, frames=400))
+    counts = [len(cv2.ORB.create(1000).detect(wall[index].color)) for index in (0, 100, 200, 300, 399)]
+    assert min(counts) > 250, counts
+
+
+def test_nothing_is_put_before_the_wall(tmp_path):
+    assert SyntheticConfig(Preset.WALL, objects=0).object_count == 0
+    for wish in ({"objects": 3}, {"meshes": tmp_path}):
+        with pytest.raises(UserError, match=f"synth:wall: nothing stands before its wall, found {next(iter(wish))} "):
+            SyntheticConfig(Preset.WALL, **wish)
 
 
 def test_truth_agrees_with_instances_and_points(tabletop):

@@ -65,12 +65,13 @@ def test_the_same_options_give_the_same_files(written: Path, tmp_path: Path) -> 
 
 
 def test_all_options_reach_the_configuration(tmp_path: Path) -> None:
-    config = command._config("kitchen", "axial,shadow", 7, "high", 5, 9, 320, tmp_path, 3)
+    config = command._config("kitchen", "axial,shadow", 7, "high", 5, 9, 320, tmp_path, 3, 2.5)
     assert (config.preset, config.clutter, config.meshes) == (Preset.KITCHEN, ClutterLevel.HIGH, tmp_path)
-    assert (config.objects, config.seed, config.frames, config.width, config.blur) == (7, 5, 9, 320, 3)
+    assert (config.objects, config.seed, config.frames, config.width) == (7, 5, 9, 320)
+    assert (config.blur, config.pace) == (3, 2.5)
     off = [name for name in ("axial", "shadow", "quantised", "edges") if not getattr(config.sensor, name)]
     assert off == ["axial", "shadow"]
-    assert command._config("survey", None, None, "medium", 0, None, 640, None, 0) == SyntheticConfig(Preset.SURVEY)
+    assert command._config("survey", None, None, "medium", 0, None, 640, None, 0, 1.0) == SyntheticConfig(Preset.SURVEY)
 
 
 def test_the_names_offered_are_those_of_the_renderer() -> None:
@@ -81,12 +82,15 @@ def test_the_names_offered_are_those_of_the_renderer() -> None:
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
-        (("--preset", "attic"), "'tabletop', 'survey', 'kitchen', 'laps'"),
+        (("--preset", "attic"), "'tabletop', 'survey', 'kitchen', 'laps', 'wall'"),
         (("--clutter", "some"), "'low', 'medium', 'high'"),
         (("--objects", "0"), "expected objects from 1"),
         (("--frames", "many"), "--frames"),
         (("--width", "70"), "divisible by 4"),
         (("--blur", "99"), "expected blur from 0"),
+        (("--pace", "0"), "expected pace above 0 and up to 8"),
+        (("--preset", "survey", "--pace", "2"), "stands still, found pace 2.0"),
+        (("--preset", "wall", "--objects", "2"), "nothing stands before its wall"),
         (("--without", "gravity"), "'gravity'"),
         (("--seed", "-1"), "expected seed from 0"),
         (("--meshes", "/nowhere/at/all"), "/nowhere/at/all"),

@@ -123,7 +123,8 @@ def test_what_was_written_can_be_rendered_and_written_again(folder: Path, tmp_pa
     [
         TabletopConfig(seed=4, sensor=IDEAL),
         SyntheticConfig(),
-        SyntheticConfig(Preset.LAPS, 7, ClutterLevel.HIGH, 5, 99, 320, Path("/scans"), 4),
+        SyntheticConfig(Preset.LAPS, 7, ClutterLevel.HIGH, 5, 99, 320, Path("/scans"), 4, 2.7),
+        SyntheticConfig(Preset.WALL, 0, pace=3.0),
         replace(SyntheticConfig(), sensor=replace(IDEAL, axial_sigma=0.1 + 0.2, grazing_cosines=(0.1, 0.3))),
     ],
 )

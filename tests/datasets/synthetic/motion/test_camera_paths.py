@@ -9,6 +9,7 @@ import pytest
 
 from thingmap.datasets.frame import Intrinsics
 from thingmap.datasets.synthetic.config import Preset
+from thingmap.datasets.synthetic.motion.along_wall import to_and_fro
 from thingmap.datasets.synthetic.motion.arcs import ArcConfig
 from thingmap.datasets.synthetic.motion.camera_paths import camera_path
 from thingmap.datasets.synthetic.motion.walk import WalkConfig, loop
@@ -17,10 +18,12 @@ from thingmap.datasets.synthetic.rendering.render import Renderer
 from thingmap.datasets.synthetic.rendering.surfaces import assemble
 from thingmap.datasets.synthetic.rooms.layout import Layout
 from thingmap.datasets.synthetic.rooms.layouts import build_layout
+from thingmap.datasets.synthetic.rooms.wall_room import ROOM
 
 CAMERA = Intrinsics(160, 120, 131.25, 131.25, 79.5, 59.5)
-FRAMES = {Preset.TABLETOP: 300, Preset.SURVEY: 37, Preset.KITCHEN: 900, Preset.LAPS: 3600}
+FRAMES = {Preset.TABLETOP: 300, Preset.SURVEY: 37, Preset.KITCHEN: 900, Preset.LAPS: 3600, Preset.WALL: 1800}
 NEAR, FAR = 0.4, 4.5  # metres, what depth cameras see
+FURNISHED = tuple(preset for preset in Preset if preset is not Preset.WALL)  # things stand there
 WALKS = (Preset.KITCHEN, Preset.LAPS)
 
 
@@ -107,7 +110,7 @@ def test_most_of_every_image_is_within_the_sensor_s_range(preset):
         assert np.percentile(depth, 1.0) > 0.35, k
 
 
-@pytest.mark.parametrize("preset", Preset)
+@pytest.mark.parametrize("preset", FURNISHED)
 def test_every_support_is_seen(preset):
     """From near enough: several images show a good part of it, and a walk comes within 2.8 m."""
     layout = scene(preset)[0]
@@ -182,3 +185,64 @@ def test_surveys_step_five_degrees_along_arcs():
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     off = np.degrees(np.arccos(np.einsum("ni,ni->n", ahead, poses[:, :3, 2])))
     assert 0.3 < np.median(off) < 2.0 and off.max() < 5.0
+
+
+@pytest.mark.parametrize("preset", [preset for preset in Preset if preset is not Preset.SURVEY])
+def test_at_a_pace_the_same_way_is_gone_sooner(preset):
+    usual_stamps, usual = camera_path(preset, 91, 4)
+    stamps, poses = camera_path(preset, 31, 4, 3.0)
+    np.testing.assert_array_equal(stamps, usual_stamps[:31])
+    np.testing.assert_allclose(poses, usual[::3], atol=1e-9)
+    np.testing.assert_array_equal(camera_path(preset, 10, 4, 3.0)[1], poses[:10])
+
+
+@pytest.mark.parametrize("seed", [1, 2, 5])
+def test_a_fast_hand_goes_round_the_table_in_free_space(seed):
+    """Ten seconds at pace 3 are more than a turn; at the usual pace it is less than half of one."""
+    poses = camera_path(Preset.TABLETOP, 300, seed, 3.0)[1]
+    azimuth = np.unwrap(np.arctan2(poses[:, 1, 3], poses[:, 0, 3]))
+    assert azimuth[-1] - azimuth[0] > 2.2 * np.pi
+    assert clear(Preset.TABLETOP, poses[::3, :3, 3], all_round(), 0.22).all()
+    depth = np.concatenate([depths(Preset.TABLETOP, T)[0] for T in poses[::25]])
+    assert np.mean((depth > NEAR) & (depth < FAR)) > 0.8
+    steps = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
+    assert 0.025 < np.median(steps) < 0.045 and steps.max() < 0.06
+    assert turned(poses[1:], poses[:-1]).max() < 4.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_along_the_wall_nothing_but_the_wall_is_seen(seed):
+    """The corners of a slightly larger image, there and back again, at twice the default's length and more."""
+    _, poses = camera_path(Preset.WALL, 1800, seed)
+    wall = ROOM.y[1]
+    for u, v in ((-3.0, -3.0), (163.0, -3.0), (163.0, 123.0), (-3.0, 123.0)):
+        ray = np.array([(u - CAMERA.cx) / CAMERA.fx, (v - CAMERA.cy) / CAMERA.fy, 1.0])
+        ahead = poses[:, :3, :3] @ ray
+        at = poses[:, :3, 3] + ((wall - poses[:, 1, 3]) / ahead[:, 1])[:, None] * ahead
+        assert ahead[:, 1].min() > 0.5
+        assert ROOM.x[0] + 0.3 < at[:, 0].min() and at[:, 0].max() < ROOM.x[1] - 0.3
+        assert at[:, 2].min() > 0.3 and at[:, 2].max() < ROOM.height - 0.2
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_wall_is_passed_at_arm_s_length_there_and_back(seed):
+    _, poses = camera_path(Preset.WALL, 1800, seed)
+    x, y, z = poses[:, :3, 3].T
+    assert np.abs(ROOM.y[1] - y - 1.2).max() < 0.1
+    speed = 30.0 * np.diff(x)
+    assert speed[:199].min() > 0.2 and np.median(speed[:199]) == pytest.approx(0.3, abs=0.05), "one way by default"
+    turns = np.flatnonzero(np.diff(np.sign(speed[::10])))
+    assert len(turns) == 3 and np.abs(x).max() < 2.3, "back and forth within a minute"
+    assert np.abs(30.0 * np.diff(speed)).max() < 1.5, "without a jerk"
+    assert 0.004 < np.std(z) < 0.03, "a gentle bob"
+
+
+def test_to_and_fro_is_even_between_its_turns():
+    walked = np.linspace(0.0, 20.0, 4001)
+    x = to_and_fro(walked, -1.6, 2.2, 0.98)
+    rate = np.diff(x) / np.diff(walked)
+    assert x[0] == pytest.approx(-1.6) and np.abs(x).max() == pytest.approx(2.2, abs=1e-4)
+    assert np.abs(rate).max() == pytest.approx(1.0, abs=1e-3)
+    assert np.abs(rate[np.abs(x[1:]) < 1.7]).min() > 0.9
+    pendulum = to_and_fro(walked, 0.0, 2.0, 1e-6)
+    np.testing.assert_allclose(pendulum, 2.0 * np.sin(walked / 2.0), atol=1e-6)

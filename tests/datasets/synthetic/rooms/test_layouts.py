@@ -129,6 +129,10 @@ def test_layouts_depend_on_the_seed_only():
         assert np.mean(same) < 0.1
 
 
+def test_nothing_can_stand_before_the_printed_wall():
+    assert build_layout(Preset.WALL, np.random.default_rng(0)).supports == ()
+
+
 def test_textures_can_be_tiled_and_meshes_are_sound(layout):
     for part in layout.parts:
         assert part.texture.dtype == np.uint8
