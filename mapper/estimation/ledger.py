@@ -17,8 +17,9 @@ import numpy as np
 
 from ...datasets.errors import InputError
 
-SCHEMA = "thingmap-ledger/2"
-_READABLE = ("thingmap-ledger/1", SCHEMA)  # 1 knew no parts: what has a default since is filled with it
+SCHEMA = "thingmap-ledger/3"
+# 1 knew no parts: what has a default since is filled with it; 2 knew no loop closures
+_READABLE = ("thingmap-ledger/1", "thingmap-ledger/2", SCHEMA)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,6 +48,23 @@ class Visual:
     b: int
     T_a_b: np.ndarray
     covariance: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Loop:
+    """Loop closure: keyframe `b` as seen from an earlier `a`: (4, 4) `T_a_b`, (6, 6) covariance."""
+
+    a: int
+    b: int
+    T_a_b: np.ndarray
+    covariance: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DropLoop:
+    """The `Loop` (or `Visual`) of this number in the ledger was found wrong: it leaves the graph."""
+
+    record: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,10 +176,24 @@ class Retire:
 
 
 Record = (
-    Gauge | Motion | Visual | UpPrior | Up | NewLandmark | DepthCentre | Box | Look | Scores | Site | Merge | Retire
+    Gauge
+    | Motion
+    | Visual
+    | Loop
+    | DropLoop
+    | UpPrior
+    | Up
+    | NewLandmark
+    | DepthCentre
+    | Box
+    | Look
+    | Scores
+    | Site
+    | Merge
+    | Retire
 )
 KINDS: tuple[type, ...] = (
-    Gauge, Motion, Visual, UpPrior, Up, NewLandmark, DepthCentre, Box, Look, Scores, Site, Merge, Retire
+    Gauge, Motion, Visual, Loop, DropLoop, UpPrior, Up, NewLandmark, DepthCentre, Box, Look, Scores, Site, Merge, Retire
 )  # fmt: skip
 
 

@@ -6,7 +6,7 @@ S(j) log half-axes     Vector3 in the upright frame
 U(0) up direction      Unit3   world axes
 
 X0 --odometry-- X1 --odometry-- X2        gauge on X0, guards (weak, never removed) on L and S,
-  \\            / |  \\                      class/size site on S
+  \\            / |  \\                      class/size site on S; loop closures as odometry, but robust
    U(0)--up---   |   box(X, L, S)
                  L1 -- S1
 """
@@ -27,7 +27,7 @@ from ...factors.depth_centre import depth_centre_factor
 from ...factors.guard import position_guard, size_guard
 from ...factors.odometry import between_factor, gauge_prior
 from ..config import SmootherConfig
-from .ledger import Box, DepthCentre, Gauge, Motion, NewLandmark, Record, Up, UpPrior, Visual
+from .ledger import Box, DepthCentre, Gauge, Loop, Motion, NewLandmark, Record, Up, UpPrior, Visual
 from .size_site import SizeSite
 
 UP = U(0)
@@ -63,7 +63,7 @@ def record_factors(record: Record, context: FactorContext) -> list[gtsam.Nonline
         case Motion():
             keys = X(record.a), X(record.b)
             return [between_factor(*keys, record.T_a_b, record.covariance, robust=c.robust_odometry)]
-        case Visual():
+        case Visual() | Loop():
             keys = X(record.a), X(record.b)
             return [between_factor(*keys, record.T_a_b, record.covariance, robust=True)]
         case UpPrior():

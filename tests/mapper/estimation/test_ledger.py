@@ -18,9 +18,11 @@ from thingmap.mapper.estimation.ledger import (
     SCHEMA,
     Box,
     DepthCentre,
+    DropLoop,
     Gauge,
     Ledger,
     Look,
+    Loop,
     Merge,
     Motion,
     NewLandmark,
@@ -43,6 +45,8 @@ def one_of_each(rng: np.random.Generator) -> list:
         Up(0, rng.normal(size=3), 0.06),
         Motion(0, 1, T, rng.random((6, 6))),
         Visual(0, 1, T, rng.random((6, 6))),
+        Loop(0, 1, T, rng.random((6, 6))),
+        DropLoop(5),
         NewLandmark(3, rng.normal(size=3), rng.normal(size=3)),
         Site(3, rng.normal(size=3), rng.random((3, 3))),
         DepthCentre(1, 3, rng.normal(size=3), 0.02, 0.05, 0.75),
@@ -109,6 +113,19 @@ def test_a_ledger_from_before_parts_tells_of_whole_objects(tmp_path):
     assert len(loaded) == len(ledger)
     for old, new in zip(loaded, ledger, strict=True):
         assert_same(old, replace(new, **plain.get(type(new), {})))
+
+
+@pytest.mark.parametrize("schema", ["thingmap-ledger/1", "thingmap-ledger/2", "thingmap-ledger/3"])
+def test_ledgers_of_all_schemas_are_read(tmp_path, schema):
+    ledger, path = Ledger(), tmp_path / "ledger.npz"
+    for record in one_of_each(np.random.default_rng(0)):
+        if not isinstance(record, Loop | DropLoop):  # of 3
+            ledger.append(record)
+    ledger.save(path)
+    with np.load(path) as file:
+        np.savez(path, **{**file, "meta": meta(schema=schema)})
+    for old, new in zip(Ledger.load(path)[0], ledger, strict=True):
+        assert_same(old, new)
 
 
 def test_what_is_not_said_of_a_look_is_full_visibility_and_no_word_from_depth():

@@ -14,8 +14,10 @@ from thingmap.mapper.config import SmootherConfig
 from thingmap.mapper.estimation.ledger import (
     Box,
     DepthCentre,
+    DropLoop,
     Gauge,
     Look,
+    Loop,
     Merge,
     Motion,
     NewLandmark,
@@ -55,6 +57,8 @@ def values(place: np.ndarray = PLACE) -> gtsam.Values:
         (Gauge(np.eye(4), np.full(6, 0.01)), [[X(0)]]),
         (Motion(0, 1, np.eye(4), np.eye(6)), [[X(0), X(1)]]),
         (Visual(0, 1, np.eye(4), np.eye(6)), [[X(0), X(1)]]),
+        (Loop(0, 1, np.eye(4), np.eye(6)), [[X(0), X(1)]]),
+        (DropLoop(4), []),
         (UpPrior(np.array([0.0, -1.0, 0.0]), 0.5), [[UP]]),
         (Up(1, np.array([0.0, -1.0, 0.0]), 0.1), [[X(1), UP]]),
         (NewLandmark(1, PLACE, LOG_SIZE), [[L(1)], [S(1)]]),
@@ -109,13 +113,14 @@ def test_boxes_are_read_in_the_upright_frame():
     assert straight.error(values()) > 0.3
 
 
-def test_visual_motion_is_robust_and_odometry_is_not_unless_told_so():
+def test_visual_motions_and_loops_are_robust_and_odometry_is_not_unless_told_so():
     far = np.eye(4)
     far[0, 3] = 10.0
-    plain, robust = Motion(0, 1, far, np.eye(6)), Visual(0, 1, far, np.eye(6))
+    plain, robust = Motion(0, 1, far, np.eye(6)), (Visual(0, 1, far, np.eye(6)), Loop(0, 1, far, np.eye(6)))
     assert record_factors(plain, context())[0].error(values()) == pytest.approx(50.0)
     huber = 1.345 * 10.0 - 0.5 * 1.345**2
-    assert record_factors(robust, context())[0].error(values()) == pytest.approx(huber)
+    for record in robust:
+        assert record_factors(record, context())[0].error(values()) == pytest.approx(huber)
     assert record_factors(plain, context(robust_odometry=True))[0].error(values()) == pytest.approx(huber)
 
 

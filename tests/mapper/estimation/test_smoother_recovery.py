@@ -40,8 +40,8 @@ def reload(smoother: Smoother, tools, path) -> Smoother:
 def break_solver(smoother: Smoother) -> None:
     """Queues a point of which only the distance is known: an indeterminate system, as a bad measurement makes one."""
     nowhere, noise = L(9999), gtsam.noiseModel.Isotropic.Sigma(1, 0.1)
-    smoother._values.insertPoint3(nowhere, np.array([0.3, 0.2, 0.1]))
-    smoother._queue[("record", -1)] = [gtsam.RangeFactor3D(X(0), nowhere, 1.0, noise)]
+    smoother._graph.values.insertPoint3(nowhere, np.array([0.3, 0.2, 0.1]))
+    smoother._graph.queue(("record", -1), [gtsam.RangeFactor3D(X(0), nowhere, 1.0, noise)])
 
 
 def test_a_breakdown_rebuilds_the_graph_and_loses_nothing(two_views, tools):
