@@ -7,6 +7,8 @@ Class 0 is "not an object"; existence is (1 - q_0) P(still there). How the kinds
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from ...factors.evidence_model import EvidenceModel
@@ -15,7 +17,7 @@ from ...factors.free_space import FreeSpace
 from ...factors.score_model import ScoreEvidence
 from ..config import BeliefConfig, PresenceConfig
 from .presence import Presence
-from .view_cells import ViewCells
+from .view_cells import UNKNOWN, ViewCells
 
 _HITS, _MISSES, _FREE, _DEPTH, _FIRST = range(5)  # columns of the cells; then (K,) own and (K,) excess
 _LOOKED_FOR, _SEEN, _SCORED = range(3)  # groups of columns: hits and misses, geometry, scores
@@ -59,6 +61,7 @@ class Belief:
         depth: float = 0.0,
         seen: float = 0.0,
         scores: ScoreEvidence | None = None,
+        keyframe: int = UNKNOWN,
     ) -> None:
         """What one look from (3,) metres off the object said.
 
@@ -69,6 +72,7 @@ class Belief:
             depth: log ratio of the depths, both times
             seen: the share of the volume that depth tells of.
             scores: of the detection; None without one, or where the object was too hidden to be recognised.
+            keyframe: its number, by which the look is placed anew when poses are corrected.
         """
         K = self._classes
         said = np.zeros(_FIRST + 2 * K)
@@ -76,12 +80,26 @@ class Belief:
         scored = scores is not None and bool(scores.own.any() or scores.background.any())
         if scores is not None and scored:
             said[_FIRST : _FIRST + K], said[_FIRST + K :] = scores.own, scores.background - scores.own
-        self._cells.add(object_to_camera, np.array([hits + misses, seen, float(scored)]), said)
+        self._cells.add(object_to_camera, np.array([hits + misses, seen, float(scored)]), said, keyframe)
 
     def look_for(self, object_to_camera: np.ndarray, free: float, seen: float, detected: bool) -> None:
         """Whether it is still there; before `look` is told of the same view. See `Presence.look`."""
         cell, weight = self._cells.find(object_to_camera)
         self._presence.look(cell, weight, free, seen, detected)
+
+    def place_anew(self, cameras: np.ndarray, position: np.ndarray) -> None:
+        """Poses were corrected: (M, 3) centres of all keyframes and (3,) position of the object, world, metres.
+
+        What was said from somewhere stays said from there, "still there" too: cells keep their numbers.
+        """
+        self._cells.place_anew(cameras, position)
+
+    def forget(self, keyframes: Iterable[int]) -> None:
+        """Takes back what these keyframes said by looking from somewhere new: they looked at the wrong place."""
+        before = len(self._cells)
+        self._cells.forget(keyframes)
+        if len(self._cells) != before:
+            self._presence.forget_places()
 
     def absorb(self, other: Belief) -> None:
         """Takes over the evidence of a landmark merged into this one."""

@@ -18,6 +18,7 @@ from .evidence import Observer, first_note
 from .landmarks import Landmark, volume_overlaps
 from .lifting import LiftedDetection
 from .outcomes import Outcome
+from .reunion import CANDIDATE_SIZE_SIGMA, distance, recall_retired, take_over, unite_candidates
 from .scene import Scene
 from .size_site import initial_site, propagate, size_evidence
 from .smoother import Smoother
@@ -26,8 +27,10 @@ from .view import View
 
 ALWAYS_REFRESHED = 6  # measurements up to which a landmark's marginals are taken at every new one
 PROPOSED_FROM = 5  # observations from which a candidate's first volume is made
-CANDIDATE_SIZE_SIGMA = 0.25  # log units; a few boxes tell a candidate's half-axes this well
 REFRESH_EVERY = 3  # new measurements between two refreshes after that: a marginal costs 0.3-1 ms
+SETTLE_EVERY = 5  # keyframes between two propagation steps of what is unsettled and not measured
+MERGED_FROM = 3  # measurements from which a landmark's place and size are worth comparing with another's
+QUIET = 20  # keyframes without a detection (5 s by hand), after which no more measurements are waited for
 
 
 class Lifecycle:
@@ -71,7 +74,7 @@ class Lifecycle:
         place = view.T_world_camera[:3, 3] - track.position
         weight = belief.weight(place)
         # what hides a part of it is not known before there is a volume
-        belief.look(place, hits=1.0, scores=scores)
+        belief.look(place, hits=1.0, scores=scores, keyframe=view.keyframe)
         track.log.append(first_note(view, best, belief, weight))
         everything = np.ones(len(Part))
         track.observations.append(Observation(view.keyframe, view.T_world_camera, tuple(shown), everything, weight))
@@ -153,12 +156,17 @@ class Lifecycle:
         return size_evidence(information, information @ track.log_size, self._priors, self._beliefs.size_outlier)
 
     def refresh(self, touched: set[int]) -> None:
-        """Landmarks follow the graph; class and size of the touched ones are brought to agree (one EP step each)."""
+        """Landmarks follow the graph; class and size of the touched ones are brought to agree (one EP step each).
+
+        What has not settled goes on settling while nothing is measured of it, but only every `SETTLE_EVERY` keyframes:
+        where the graph has not changed lately a marginal costs 20 ms, most of which those asked for together share.
+        """
+        settle = self._smoother.keyframes % SETTLE_EVERY == 0
         for number, landmark in self._scene.landmarks.items():
             landmark.position, landmark.log_size = self._smoother.position(number), self._smoother.log_size(number)
             new = landmark.measurements - landmark.refreshed_at
             due = new and (landmark.measurements <= ALWAYS_REFRESHED or new >= REFRESH_EVERY)
-            if due or landmark.unsettled:
+            if due or (landmark.unsettled and (new or settle)):
                 self.refresh_fully(landmark)
             elif number in touched:
                 landmark.belief.update()
@@ -197,9 +205,14 @@ class Lifecycle:
             landmark.size_site = smoother.sites[number]
             landmark.belief.update()
 
-    def merge(self) -> None:
-        """Landmarks whose volumes overlap and whose positions agree under their joint covariance are one thing."""
-        landmarks = sorted(self._scene.landmarks.values(), key=lambda landmark: landmark.number)
+    def merge(self, all_seen: bool = False) -> None:
+        """Landmarks whose volumes overlap and whose positions agree under their joint covariance are one thing.
+
+        Args:
+            all_seen: no more views will come, so that even what was measured once or twice is compared.
+        """
+        known = [x for x in self._scene.landmarks.values() if all_seen or self._is_measured(x)]
+        landmarks = sorted(known, key=lambda landmark: landmark.number)
         overlaps = volume_overlaps(landmarks, self._smoother.R_world_upright)
         gone: set[int] = set()
         for i, j in np.argwhere(np.triu(overlaps > self._config.merge_overlap, k=1)):
@@ -207,29 +220,38 @@ class Lifecycle:
             if kept.number in gone or other.number in gone or not self._are_one(kept, other):
                 continue
             self._smoother.merge(kept.number, other.number)
-            kept.count_from(other)
-            kept.belief.update()
+            take_over(kept, other)
             del self._scene.landmarks[other.number]
             gone.add(other.number)
             self._outcomes[Outcome.MERGED] += 1
+
+    def reunite(self) -> bool:
+        """Poses were corrected: whatever now turns out to be one thing becomes one; whether anything did.
+
+        Landmarks must be up to date, and the smoother has to be updated afterwards.
+        """
+        self._refused.clear()
+        before = self._outcomes[Outcome.MERGED]
+        self.merge()
+        self._outcomes[Outcome.MERGED] += recall_retired(self._scene, self._smoother, self._config)
+        configs = self._tracks, self._config
+        self._outcomes[Outcome.MERGED] += unite_candidates(self._scene, self._smoother, self._observer, *configs)
+        return self._outcomes[Outcome.MERGED] > before
+
+    def _is_measured(self, landmark: Landmark) -> bool:
+        """Measured often enough to be compared, or as often as it will be for now."""
+        last = max(landmark.supporting, default=0)
+        return landmark.measurements >= MERGED_FROM or self._smoother.keyframes - last > QUIET
 
     def _are_one(self, a: Landmark, b: Landmark) -> bool:
         pair, measurements = (a.number, b.number), a.measurements + b.measurements
         if self._refused.get(pair) == measurements:
             return False
-        # a book in the middle of a table is at the same place, but not of the same size
-        size_covariance = a.log_size_covariance + b.log_size_covariance + self._config.merge_log_size**2 * np.eye(3)
-        unlike = a.log_size - b.log_size
-        size = float(unlike @ np.linalg.solve(size_covariance, unlike))
-        extent = self._config.merge_extent * min(float(np.mean(a.half_axes)), float(np.mean(b.half_axes)))
-        apart, misfit = a.position - b.position, extent**2 * np.eye(3)
-
-        def distance(covariance: np.ndarray) -> float:
-            return size + float(apart @ np.linalg.solve(covariance + misfit, apart))
-
         # Cov(a - b) <= 2 (Cov a + Cov b) spares the joint covariance (36 ms at 1000 keyframes) of what is far apart
-        one = distance(2.0 * (a.covariance + b.covariance)) < self._config.merge_gate
-        one = one and distance(self._smoother.difference_covariance(*pair)) < self._config.merge_gate
+        one = distance(a, b, 2.0 * (a.covariance + b.covariance), self._config) < self._config.merge_gate
+        if one:
+            joint = self._smoother.difference_covariance(*pair)
+            one = distance(a, b, joint, self._config) < self._config.merge_gate
         if not one:
             self._refused[pair] = measurements
         return one

@@ -71,7 +71,11 @@ class Presence:
         self._gone = min(self._gone, other._gone)
         self._free += other._free - USUAL_LOOKS * self._config.usual_free
         self._looks += other._looks - USUAL_LOOKS
-        self._usual_from.clear()  # the numbers of the cells are no longer the same
+        self.forget_places()
+
+    def forget_places(self) -> None:
+        """The numbers of the cells are no longer the same."""
+        self._usual_from.clear()
 
     def _removed(self, free: float, usual: float) -> float:
         return float(self._free_space.removed(np.array([free]), np.array([usual]))[0])

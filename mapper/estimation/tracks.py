@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from filterpy.kalman import KalmanFilter
@@ -21,7 +21,7 @@ class Observation:
 
     Attributes:
         keyframe: its number.
-        T_world_camera: (4, 4) its pose as known then.
+        T_world_camera: (4, 4) its pose as known at the time, or at the last correction of the poses since.
         detections: at most one a template, the one that weighs most first.
         visible: (5,) visible share of every part.
         weight: how new the view was, 0 to 1.
@@ -32,6 +32,12 @@ class Observation:
     detections: tuple[LiftedDetection, ...]
     visible: np.ndarray
     weight: float
+
+    @property
+    def place(self) -> tuple[np.ndarray, np.ndarray]:
+        """(3,) world, metres, and (3, 3) covariance of the object, by the detection that weighs most."""
+        best, R = self.detections[0], self.T_world_camera[:3, :3]
+        return R @ best.centre + self.T_world_camera[:3, 3], R @ best.covariance() @ R.T
 
     @property
     def shares(self) -> np.ndarray:
@@ -72,14 +78,44 @@ class Track:
         self.correct(position, covariance)
         self.observations.append(seen)
 
-    def predict(self, config: TrackConfig) -> None:
-        """One keyframe passes: odometry drift against the map widens the position."""
-        self._filter.Q = np.eye(3) * config.process_sigma**2
+    def predict(self, config: TrackConfig, keyframes: int = 1) -> None:
+        """Keyframes pass: odometry drift against the map widens the position."""
+        self._filter.Q = np.eye(3) * keyframes * config.process_sigma**2
         self._filter.predict()
 
     def correct(self, position: np.ndarray, covariance: np.ndarray) -> None:
         """A detection at (3,) world with (3, 3) covariance."""
         self._filter.update(position, R=covariance)
+
+    def follow(self, T_world_keyframe: np.ndarray, config: TrackConfig) -> None:
+        """Poses were corrected, (M, 4, 4) of all keyframes: position and covariance are found anew.
+
+        The filter goes through the observations again, each at its keyframe's pose, as if those had been known.
+        """
+        moved = (replace(seen, T_world_camera=T_world_keyframe[seen.keyframe]) for seen in self.observations)
+        first, *later = self.observations = sorted(moved, key=lambda seen: seen.keyframe)
+        self._filter.x, self._filter.P = first.place
+        now = first.keyframe
+        for seen in later:
+            self.predict(config, seen.keyframe - now)
+            self.correct(*seen.place)
+            now = seen.keyframe
+        self.predict(config, len(T_world_keyframe) - now)
+
+    def absorb(self, other: Track, T_world_keyframe: np.ndarray, config: TrackConfig) -> None:
+        """Takes over a candidate that turned out to be this one; (M, 4, 4) poses of all keyframes."""
+        own = {seen.keyframe for seen in self.observations}
+        # a keyframe that missed the one and showed the other was wrong about where it looked
+        self.belief.forget(self.misses & other.hits)
+        other.belief.forget(other.misses & self.hits)
+        self.observations += [seen for seen in other.observations if seen.keyframe not in own]
+        self.hits |= other.hits
+        self.misses = (self.misses | other.misses) - self.hits
+        self.misses_in_a_row = min(self.misses_in_a_row, other.misses_in_a_row)
+        self.first_seen, self.last_seen = min(self.first_seen, other.first_seen), max(self.last_seen, other.last_seen)
+        self.belief.absorb(other.belief)
+        self.log.absorb(other.log)
+        self.follow(T_world_keyframe, config)
 
     @property
     def position(self) -> np.ndarray:

@@ -11,9 +11,13 @@ look, and what it says does not depend on the order of its looks.
 
 Not every look tells of everything: scores come with detections only, and of a half hidden thing depth tells half. So
 each group of columns has its own n, the sum of the looks' masses in [0, 1].
+
+A cell knows the keyframe of its first look, by which its place is found anew when poses are corrected (`place_anew`).
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -21,6 +25,7 @@ from ..config import BeliefConfig
 
 NEW_CELL = 0.3  # novelty above which a place gets a cell of its own
 MAX_CELLS = 64  # directions 10 degrees apart over half a sphere; beyond it the nearest cell takes the look
+UNKNOWN = -1  # keyframe of a look of which only the place was told
 
 
 class ViewCells:
@@ -35,6 +40,7 @@ class ViewCells:
         self._config = config
         self._group = np.repeat(np.arange(len(groups)), groups)  # of every column
         self._places = np.empty((0, 4))  # direction, log range
+        self._keyframes = np.empty(0, dtype=np.int64)  # of the first look; UNKNOWN where nobody said
         self._weights, self._counts = np.empty(0), np.empty(0)
         self._masses, self._sums = np.empty((0, len(groups))), np.empty((0, sum(groups)))
 
@@ -52,11 +58,11 @@ class ViewCells:
         n = self._counts[nearest]
         return nearest, float(self._weights[nearest] * (self._views(n + 1.0) - self._views(n)))
 
-    def add(self, object_to_camera: np.ndarray, masses: np.ndarray, said: np.ndarray) -> None:
-        """A look from (3,) metres off the object that said (columns,), times the (groups,) masses of its groups."""
+    def add(self, object_to_camera: np.ndarray, masses: np.ndarray, said: np.ndarray, keyframe: int = UNKNOWN) -> None:
+        """A keyframe's look from (3,) metres off the object: (columns,), times the (groups,) masses of its groups."""
         cell, weight = self.find(object_to_camera)
         if cell == len(self):
-            self._append(_place(object_to_camera), weight, 1.0, masses, said)
+            self._append(_place(object_to_camera), keyframe, weight, 1.0, masses, said)
         else:
             self._counts[cell] += 1.0
             self._masses[cell] += masses
@@ -74,20 +80,41 @@ class ViewCells:
 
     def absorb(self, other: ViewCells) -> None:
         """Takes over the looks of a landmark merged into this one: its cells join the nearest here, or are new."""
-        cells = other._places, other._weights, other._counts, other._masses, other._sums
-        for place, weight, count, masses, said in zip(*cells, strict=True):
+        cells = other._places, other._keyframes, other._weights, other._counts, other._masses, other._sums
+        for place, keyframe, weight, count, masses, said in zip(*cells, strict=True):
             nearest, novelty = self._nearest(place)
             if novelty > NEW_CELL and len(self) < MAX_CELLS:
-                self._append(place, min(weight, novelty), count, masses, said)
+                self._append(place, keyframe, min(weight, novelty), count, masses, said)
             else:
                 self._counts[nearest] += count
                 self._masses[nearest] += masses
                 self._sums[nearest] += said
 
-    def _append(self, place: np.ndarray, weight: float, count: float, masses: np.ndarray, said: np.ndarray) -> None:
-        self._places, self._weights = np.vstack([self._places, place]), np.append(self._weights, weight)
-        self._counts, self._masses = np.append(self._counts, count), np.vstack([self._masses, masses])
-        self._sums = np.vstack([self._sums, said])
+    def place_anew(self, cameras: np.ndarray, position: np.ndarray) -> None:
+        """Poses were corrected: where the looks came from as it is known now.
+
+        Numbers of the cells and what they say stay; a cell whose keyframe is not known stays where it was.
+
+        Args:
+            cameras: (M, 3) world, metres: centres of all keyframes.
+            position: (3,) of the object.
+        """
+        for cell in np.flatnonzero(self._keyframes != UNKNOWN):
+            self._places[cell] = _place(cameras[self._keyframes[cell]] - position)
+
+    def forget(self, keyframes: Iterable[int]) -> None:
+        """Takes back what was said from where one of these keyframes was the first to look."""
+        kept = ~np.isin(self._keyframes, [k for k in keyframes if k != UNKNOWN])
+        self._places, self._keyframes = self._places[kept], self._keyframes[kept]
+        self._weights, self._counts = self._weights[kept], self._counts[kept]
+        self._masses, self._sums = self._masses[kept], self._sums[kept]
+
+    def _append(
+        self, place: np.ndarray, keyframe: int, weight: float, count: float, masses: np.ndarray, said: np.ndarray
+    ) -> None:
+        self._places, self._keyframes = np.vstack([self._places, place]), np.append(self._keyframes, keyframe)
+        self._weights, self._counts = np.append(self._weights, weight), np.append(self._counts, count)
+        self._masses, self._sums = np.vstack([self._masses, masses]), np.vstack([self._sums, said])
 
     def _nearest(self, place: np.ndarray) -> tuple[int, float]:
         """The nearest cell and how new the place is beside it, 0 to 1."""

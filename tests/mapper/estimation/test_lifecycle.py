@@ -266,3 +266,47 @@ def test_the_graph_of_a_whole_life_can_be_rebuilt(tools, tmp_path):
     for j in loaded.sites:
         np.testing.assert_allclose(loaded.position(j), stage.smoother.position(j), atol=0.01)
         np.testing.assert_allclose(loaded.log_size(j), stage.smoother.log_size(j), atol=0.1)
+
+
+def refreshed(stage, settling: bool, measured: bool, keyframes: int) -> int:
+    """How often the only landmark is refreshed fully in so many keyframes without a look at it."""
+    (landmark,) = stage.scene.landmarks.values()
+    times, fully = [], stage.lifecycle.refresh_fully
+    stage.lifecycle.refresh_fully = lambda it: (times.append(it), fully(it))  # type: ignore[method-assign]
+    for _ in range(keyframes):
+        stage.smoother.add_keyframe(np.eye(4), np.diag(np.full(6, 1e-4)))
+        stage.smoother.update()
+        landmark.unsettled = settling
+        landmark.measurements += measured
+        stage.lifecycle.refresh(set())
+    return len(times)
+
+
+@pytest.mark.parametrize(
+    ("settling", "measured", "expected"), [(True, True, 10), (True, False, 2), (False, True, 3), (False, False, 0)]
+)
+def test_landmarks_are_refreshed_when_measured_and_settle_slowly_otherwise(tools, settling, measured, expected):
+    """Every third measurement of what was measured often; every one while it is settling; else every fifth keyframe."""
+    stage = follow(tools.Stage(), cup(tools), places=np.linspace(-0.8, 0.8, 12))
+    (landmark,) = stage.scene.landmarks.values()
+    landmark.measurements = landmark.refreshed_at = 12
+    assert refreshed(stage, settling, measured, 10) == expected
+
+
+def test_what_was_measured_twice_is_not_merged_before_more_views_had_their_chance(tools):
+    stage = twins(tools, 0.02)
+    stage.scene.landmarks[2].measurements = 2
+    stage.lifecycle.merge()
+    assert sorted(stage.scene.landmarks) == [1, 2]
+    for x in np.linspace(3.0, 4.0, 20):  # looks away; nothing is to be waited for any more
+        stage.view(x)
+    stage.smoother.update()
+    stage.lifecycle.merge()
+    assert sorted(stage.scene.landmarks) == [1]
+
+
+def test_where_all_views_were_seen_few_measurements_are_merged_too(tools):
+    stage = twins(tools, 0.02)
+    stage.scene.landmarks[2].measurements = 2
+    stage.lifecycle.merge(all_seen=True)
+    assert sorted(stage.scene.landmarks) == [1]

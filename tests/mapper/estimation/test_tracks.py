@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from thingmap.factors.evidence_model import generic_evidence_model
 from thingmap.mapper.config import TrackConfig
@@ -107,3 +108,80 @@ def test_templates_that_fire_together_share_one_measurement():
     np.testing.assert_allclose(alone.shares, [0.5])
     hardly = Observation(0, np.eye(4), detections[:1], np.zeros(5), 1.0)
     np.testing.assert_allclose(hardly.shares, [MIN_SHARE])
+
+
+def pose(seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = Rotation.random(rng=rng).as_matrix(), rng.normal(size=3)
+    return T
+
+
+POSES = np.array([pose(seed) for seed in range(9)])
+
+
+def seen_from(keyframe: int, poses: np.ndarray = POSES) -> Observation:
+    """Something near the origin, measured with noise that is larger along the ray."""
+    noise, T = 0.05 * np.random.default_rng(keyframe).normal(size=3), poses[keyframe]
+    centre = T[:3, :3].T @ (noise - T[:3, 3])
+    detection = replace(observation(0, (0.1,) * 3).detections[0], centre=centre, sigma_range=0.3)
+    return Observation(keyframe, T, (detection,), np.ones(5), 1.0)
+
+
+def live(keyframes: tuple[int, ...], now: int = 8, poses: np.ndarray = POSES) -> Track:
+    """A candidate that was seen by these keyframes, as the mapper does it: each ends with a prediction."""
+    observations = {keyframe: seen_from(keyframe, poses) for keyframe in keyframes}
+    track = Track(1, *observations[keyframes[0]].place, Belief(2, generic_evidence_model()))
+    track.observations.append(observations[keyframes[0]])
+    track.hits = set(keyframes)
+    track.predict(CONFIG)
+    for keyframe in range(keyframes[0] + 1, now + 1):
+        if keyframe in observations:
+            track.see(observations[keyframe], *observations[keyframe].place)
+        track.predict(CONFIG)
+    return track
+
+
+def assert_same(a: Track, b: Track) -> None:
+    np.testing.assert_allclose(a.position, b.position, atol=1e-9)
+    np.testing.assert_allclose(a.covariance, b.covariance, atol=1e-9)
+    assert [x.keyframe for x in a.observations] == [x.keyframe for x in b.observations]
+
+
+def test_following_poses_that_did_not_move_changes_nothing():
+    track = live((1, 3, 4, 7))
+    track.follow(POSES, CONFIG)
+    assert_same(track, live((1, 3, 4, 7)))
+
+
+def test_a_candidate_moves_and_turns_with_the_poses_it_was_seen_from():
+    """The poses that saw it move together, those that did not see it elsewhere."""
+    track, before, T = live((2, 3, 5)), live((2, 3, 5)), pose(100)
+    moved = POSES.copy()
+    moved[2:6] = T @ moved[2:6]
+    moved[7] = pose(101)
+    track.follow(moved, CONFIG)
+    np.testing.assert_allclose(track.position, T[:3, :3] @ before.position + T[:3, 3])
+    np.testing.assert_allclose(track.covariance, T[:3, :3] @ before.covariance @ T[:3, :3].T, atol=1e-12)
+    np.testing.assert_allclose([x.T_world_camera for x in track.observations], moved[[2, 3, 5]])
+
+
+def test_each_observation_moves_with_its_own_keyframe():
+    """Half of it was seen from a pose that was 30 cm off."""
+    wrong = POSES.copy()
+    wrong[5:, 0, 3] += 0.3
+    track = live((1, 2))
+    track.see(replace(seen_from(6), T_world_camera=wrong[6]), *replace(seen_from(6), T_world_camera=wrong[6]).place)
+    assert np.linalg.norm(track.position) > 0.07
+    track.follow(POSES, CONFIG)
+    assert_same(track, live((1, 2, 6)))
+
+
+def test_a_candidate_that_absorbs_another_is_as_if_it_had_been_one():
+    track, other = live((3, 6)), live((1, 4, 6, 7))
+    track.misses, other.misses, track.misses_in_a_row, other.misses_in_a_row = {1, 5}, {2, 3}, 2, 0
+    track.first_seen, other.first_seen, track.last_seen, other.last_seen = 0.3, 0.1, 0.6, 0.7
+    track.absorb(other, POSES, CONFIG)
+    assert_same(track, live((1, 3, 4, 6, 7)))
+    assert track.hits == {1, 3, 4, 6, 7} and track.misses == {2, 5} and track.misses_in_a_row == 0
+    assert (track.first_seen, track.last_seen) == (0.1, 0.7)

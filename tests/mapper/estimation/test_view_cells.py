@@ -168,3 +168,44 @@ def test_less_than_one_look_counts_as_itself(mass, said):
     cells = make()
     cells.add(at(0.0), np.array([mass]), np.array([mass * said]))
     np.testing.assert_allclose(cells.totals(), [mass * said], atol=1e-9)
+
+
+def test_looks_are_placed_anew_by_their_keyframes():
+    """Cameras move, the object too: a look from keyframe t is one from where t is now, with the same number."""
+    cells, before = make(), np.array([at(0.0), at(1.0), at(2.0)])
+    for keyframe in (1, 2, 0):
+        cells.add(before[keyframe], ONE, (keyframe + 1.0) * ONE, keyframe)
+    said = cells.totals()
+    cameras, position = np.array([at(4.0), at(5.0, 4.0), at(3.0)]), np.array([0.5, 0.0, 0.2])
+    cells.place_anew(cameras, position)
+    for cell, keyframe in enumerate((1, 2, 0)):
+        assert cells.find(cameras[keyframe] - position)[0] == cell
+    assert cells.find(before[1])[1] == 1.0  # nobody has looked from there now
+    np.testing.assert_array_equal(cells.totals(), said)
+
+
+def test_a_look_of_an_unknown_keyframe_stays_where_it_was():
+    cells = make()
+    cells.add(at(0.0), ONE, ONE)
+    cells.place_anew(np.array([at(2.0)]), np.zeros(3))
+    assert cells.find(at(0.0))[0] == 0 and cells.find(at(2.0))[0] == 1
+
+
+def test_absorbed_looks_keep_their_keyframes():
+    cells, other = make(), make()
+    cells.add(at(0.0), ONE, ONE, 0)
+    other.add(at(1.0), ONE, ONE, 1)
+    cells.absorb(other)
+    cells.place_anew(np.array([at(3.0), at(4.0)]), np.zeros(3))
+    assert [cells.find(at(angle))[0] for angle in (3.0, 4.0)] == [0, 1]
+
+
+def test_what_a_keyframe_said_from_somewhere_new_can_be_taken_back():
+    cells = make(2)
+    for keyframe, angle in enumerate((0.0, 1.0, 2.0)):
+        cells.add(at(angle), ONE, np.array([1.0, keyframe]), keyframe)
+    cells.add(at(3.0), ONE, np.array([1.0, 10.0]))
+    cells.forget({1, 7, -1})
+    assert len(cells) == 3
+    np.testing.assert_allclose(cells.totals(), [3.0, 0.0 + 2.0 + 10.0])
+    assert cells.find(at(1.0)) == (3, 1.0)
