@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from .lidar import LidarScan
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +45,7 @@ class FrameProblem(Enum):
     """Why a frame of a sequence cannot be used."""
 
     UNREADABLE = "unreadable image"
+    UNREADABLE_SCAN = "unreadable scan"
     SIZE_MISMATCH = "image size differs from the sequence's"
     NO_DEPTH = "no valid depth"
     MISSING_POSE = "missing pose"
@@ -57,7 +62,10 @@ class BrokenFrame(Exception):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """An RGB-D image. Camera axes are OpenCV's: x right, y down, z forward.
+    """An RGB-D image, or a LiDAR's sweep with the image of a camera beside it, where there is one.
+
+    Camera axes are OpenCV's: x right, y down, z forward. Without a camera the images are empty, the intrinsics those of
+    an image of no size (`lidar.NO_CAMERA`), and poses are those of the camera axes that `scan.T_camera_lidar` defines.
 
     Attributes:
         index: position in the sequence.
@@ -65,10 +73,11 @@ class Frame:
             (frame-000000.color.png is "frame-000000"); recorded detections are matched by it.
         stamp: seconds.
         color: (H, W, 3) uint8, RGB.
-        depth: (H, W) float32, metres along z, registered to colour; 0 = no reading.
+        depth: (H, W) float32, metres along z, registered to colour; 0 = no reading. With a scan: its points projected.
         intrinsics: of both images.
         T_world_camera: (4, 4) ground-truth pose in the dataset's world, or None.
         specific_force: (3,) accelerometer reading in camera axes, m/s^2 (points up at rest), or None.
+        scan: the sweep of a LiDAR, or None where depth is a camera's.
     """
 
     index: int
@@ -79,3 +88,9 @@ class Frame:
     intrinsics: Intrinsics
     T_world_camera: np.ndarray | None = None
     specific_force: np.ndarray | None = None
+    scan: LidarScan | None = None
+
+    @property
+    def has_image(self) -> bool:
+        """Whether there is a camera: a LiDAR may come without."""
+        return self.intrinsics.width > 0

@@ -50,14 +50,25 @@ def read_frame_images(files: FrameFiles, unit: DepthUnit, intrinsics: Intrinsics
         BrokenFrame: a file is missing or cannot be decoded (`UNREADABLE`), a size is not that of the intrinsics
             (`SIZE_MISMATCH`), or no pixel has a depth (`NO_DEPTH`).
     """
-    color = _decode(files.name, files.color, _COLOR_FLAGS)
-    _check_size(files.name, files.color, color, intrinsics)
+    color = read_color(files.name, files.color, intrinsics)
     raw = _decode(files.name, files.depth, cv2.IMREAD_UNCHANGED)
     _check_size(files.name, files.depth, raw, intrinsics)
     depth = _metres(files, raw, unit)
     if not depth.any():
         raise BrokenFrame(files.name, FrameProblem.NO_DEPTH, f"no pixel of {files.depth.name} has a depth")
     return color, depth
+
+
+def read_color(name: str, path: Path, intrinsics: Intrinsics) -> np.ndarray:
+    """(H, W, 3) uint8 RGB of the frame that is called `name`.
+
+    Raises:
+        BrokenFrame: the file is missing or cannot be decoded (`UNREADABLE`), or its size is not that of the intrinsics
+            (`SIZE_MISMATCH`).
+    """
+    color = _decode(name, path, _COLOR_FLAGS)
+    _check_size(name, path, color, intrinsics)
+    return color
 
 
 def first_image_size(paths: Iterable[Path]) -> tuple[int, int] | None:

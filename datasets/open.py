@@ -6,7 +6,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from . import folder, rgbd_scenes_v1, rgbd_scenes_v2, seven_scenes, tum, tum_keyframes
+from . import (
+    folder,
+    kitti,
+    kitti_raw,
+    pcd_folder,
+    rgbd_scenes_v1,
+    rgbd_scenes_v2,
+    seven_scenes,
+    tum,
+    tum_keyframes,
+)
 from .errors import InputError, UserError
 from .paths import user_path
 from .sequence import Sequence
@@ -43,6 +53,9 @@ LOADERS = (
     Loader(
         "rgbd-scenes-v2", rgbd_scenes_v2.LAYOUT, rgbd_scenes_v2.find_rgbd_scenes_v2, rgbd_scenes_v2.open_rgbd_scenes_v2
     ),
+    Loader("kitti", kitti.LAYOUT, kitti.find_kitti, kitti.open_kitti),
+    Loader("kitti", kitti_raw.LAYOUT, kitti_raw.find_kitti_raw, kitti_raw.open_kitti_raw),
+    Loader("pcd", pcd_folder.LAYOUT, pcd_folder.find_pcd_folder, pcd_folder.open_pcd_folder),
     Loader("folder", folder.LAYOUT, folder.find_folder, folder.open_folder),
 )
 DATASETS = tuple(dict.fromkeys(loader.dataset for loader in LOADERS))

@@ -62,7 +62,11 @@ class PlaneInformation:
 
 
 def point_to_plane_covariance(
-    points_source: np.ndarray, T_world_camera: np.ndarray, map_points: np.ndarray, seed: int = 0
+    points_source: np.ndarray,
+    T_world_camera: np.ndarray,
+    map_points: np.ndarray,
+    seed: int = 0,
+    radius_m: float = RADIUS_M,
 ) -> PlaneInformation:
     """Information that a registered depth image carries about its pose (the module's equation).
 
@@ -71,13 +75,14 @@ def point_to_plane_covariance(
         T_world_camera: (4, 4) final pose of the registration.
         map_points: (M, 3) metres, world frame; the map that the image was registered against.
         seed: of the sample of the source; the same input gives the same answer.
+        radius_m: how far from a point the map points of its plane may lie; larger for the sparse map of a LiDAR.
     """
     source = np.asarray(points_source, dtype=float)
     if len(source) > SAMPLES:
         source = source[np.random.default_rng(seed).choice(len(source), SAMPLES, replace=False, shuffle=False)]
     T = np.asarray(T_world_camera, dtype=float)
     points = source @ T[:3, :3].T + T[:3, 3]
-    planes = _planes(points, np.ascontiguousarray(map_points, dtype=float))
+    planes = _planes(points, np.ascontiguousarray(map_points, dtype=float), radius_m)
     if len(planes.index) == 0:
         return PlaneInformation(np.zeros((6, 6)), math.nan, 0.0, 0)
     residual = np.einsum("ni,ni->n", planes.axes[:, :, 0], points[planes.index] - planes.origins)
@@ -98,9 +103,9 @@ class _Planes(NamedTuple):
     weights: np.ndarray  # (P, 3): 1 for the normal, minus the variance of the normal towards the others
 
 
-def _planes(points: np.ndarray, map_points: np.ndarray) -> _Planes:
+def _planes(points: np.ndarray, map_points: np.ndarray, radius_m: float) -> _Planes:
     """Planes of the map around (N, 3) points, by least squares on the nearest map points."""
-    near = _nearest(np.ascontiguousarray(points), map_points, NEIGHBOURS, RADIUS_M)
+    near = _nearest(np.ascontiguousarray(points), map_points, NEIGHBOURS, radius_m)
     index = np.flatnonzero((near >= 0).sum(axis=1) >= MIN_NEIGHBOURS)
     near = near[index]
     used = (near >= 0).astype(float)

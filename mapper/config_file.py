@@ -18,23 +18,24 @@ from .config_values import WrongValue, convert
 T = TypeVar("T")
 
 
-def load_config(path: str | Path | None, cls: type[T]) -> T:
+def load_config(path: str | Path | None, cls: type[T], base: T | None = None) -> T:
     """The defaults of `cls`, overridden by what a YAML file says; without a file, the defaults.
 
     Args:
         path: YAML whose keys are field names and whose mappings are nested dataclasses, or None.
         cls: a dataclass; its fields may be bool, int, float, str, Path, an Enum (by value), a Literal, a dataclass,
             and tuples, lists, dicts and unions of these.
+        base: taken for the defaults, where given.
 
     Raises:
         InputError: the file is absent or not YAML, a key is unknown, given twice or missing, or a value has the wrong
             type or is refused by the dataclass; it names the file and the key.
     """
     if path is None:
-        return cls()
+        return cls() if base is None else base
     path = Path(path)
     document = _read_yaml(path)
-    return _build(cls, {} if document is None else document, _Place(path))
+    return _build(cls, {} if document is None else document, _Place(path), MISSING if base is None else base)
 
 
 def dump_config(instance: Any) -> str:

@@ -14,6 +14,7 @@ from .sources import DatasetOption, MaxFramesOption, StrideOption
 if TYPE_CHECKING:
     import numpy as np
 
+    from ...datasets.lidar import LidarScan
     from ...datasets.sequence import Sequence
     from ..map.object_map import ObjectMap
 
@@ -57,7 +58,8 @@ def _sequence_lines(sequence: Sequence) -> Iterator[Line]:
 
     k = sequence.intrinsics
     yield "frames", str(len(sequence))
-    yield "image", f"{k.width} x {k.height}, fx {k.fx:.2f}, fy {k.fy:.2f}, cx {k.cx:.2f}, cy {k.cy:.2f}"
+    size = f"{k.width} x {k.height}, fx {k.fx:.2f}, fy {k.fy:.2f}, cx {k.cx:.2f}, cy {k.cy:.2f}"
+    yield "image", size if k.width > 0 else "none: a LiDAR without a camera"
     if len(sequence):
         seconds = float(sequence.stamps[-1] - sequence.stamps[0])
         rate = f", {(len(sequence) - 1) / seconds:.1f} frames/s" if seconds > 0.0 else ""
@@ -111,6 +113,10 @@ def _depth_lines(sequence: Sequence) -> Iterator[Line]:
         except BrokenFrame as problem:
             yield "broken frame", str(problem)
             continue
+        if frame.scan is not None:
+            yield f"scan of {frame.name}", _scan(frame.scan)
+        if not frame.has_image:
+            return
         valid = frame.depth[frame.depth > 0.0]
         share = f"{100.0 * valid.size / frame.depth.size:.0f} % valid"
         if valid.size:
@@ -118,6 +124,16 @@ def _depth_lines(sequence: Sequence) -> Iterator[Line]:
             share += f", {low:.2f} to {high:.2f} m (1 to 99 %), median {middle:.2f} m"
         yield f"depth of {frame.name}", share
         return
+
+
+def _scan(scan: LidarScan) -> str:
+    import numpy as np
+
+    low, middle, high = np.percentile(np.linalg.norm(scan.points, axis=1), (1.0, 50.0, 99.0))
+    timed = "points of one moment"
+    if scan.times is not None:
+        timed = f"taken from {scan.times.min():+.3f} to {scan.times.max():+.3f} s after its stamp"
+    return f"{len(scan.points)} points, {low:.2f} to {high:.2f} m (1 to 99 %), median {middle:.2f} m, {timed}"
 
 
 def _map_lines(path: Path) -> Iterator[Line]:

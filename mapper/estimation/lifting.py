@@ -123,7 +123,7 @@ def lift_box(
     surface = k.back_project((whole[None, :2] + whole[None, 2:]) / 2.0, np.array([z]))[0]
     distance = float(np.linalg.norm(surface))
     spread = 1.4826 * float(np.median(np.abs(readings - z)))
-    noise = config.sensor_noise * z * z
+    noise = config.noise_floor + config.sensor_noise * z * z
     seen = _sides_seen(xyxy, k.width, k.height, config.border)
     tangential, along = (1.0, 1.0) if part == Part.WHOLE else (HALF_TANGENTIAL, HALF_RANGE)
     across = config.sigma_tangential if seen.all() else 1.0  # the centre of a cut box is not the object's

@@ -28,6 +28,13 @@ def camera_prior(config: UpConfig) -> UpMeasurement:
     return UpMeasurement(np.array([0.0, -1.0, 0.0]), config.prior_sigma, "camera prior")
 
 
+def scanner_prior(frame: Frame, config: UpConfig) -> UpMeasurement | None:
+    """A LiDAR stands upright: up is its z axis. None for a depth camera."""
+    if frame.scan is None:
+        return None
+    return UpMeasurement(frame.scan.T_camera_lidar[:3, 2], config.scanner_sigma, "LiDAR axis")
+
+
 def from_accelerometer(frame: Frame, config: UpConfig) -> UpMeasurement | None:
     """At rest the specific force points up; readings far from 1 g are the hand's and are left out."""
     if frame.specific_force is None:

@@ -31,10 +31,15 @@ def recordings(tmp_path: Path, write_images) -> Path:
     write_images(tmp_path / "rgbd-scenes-v1/desk_1/desk_1_1.png", tmp_path / "rgbd-scenes-v1/desk_1/desk_1_1_depth.png")
     scene = tmp_path / "rgbd-scenes-v2/imgs/scene_01"
     write_images(scene / "00000-color.png", scene / "00000-depth.png")
+    for place in ("kitti/velodyne/000000.bin", "pcd/1.pcd"):
+        (tmp_path / place).parent.mkdir(parents=True)
+    np.ones((4, 4), dtype=np.float32).tofile(tmp_path / "kitti/velodyne/000000.bin")
+    (tmp_path / "kitti/calib.txt").write_text(f"P0: {'1 ' * 12}\nTr: 1 0 0 0 0 1 0 0 0 0 1 0\n")
+    (tmp_path / "pcd/1.pcd").write_text("FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n1 2 3\n")
     return tmp_path
 
 
-NAMES = {"7scenes": "7scenes-seq-01", "rgbd-scenes-v1": "desk_1", "rgbd-scenes-v2": "scene_01"}
+NAMES = {"7scenes": "7scenes-seq-01", "kitti": "kitti-kitti", "rgbd-scenes-v1": "desk_1", "rgbd-scenes-v2": "scene_01"}
 
 
 @pytest.mark.parametrize("dataset", DATASETS)
@@ -98,8 +103,8 @@ def test_two_layouts_at_one_path_are_listed_and_a_name_decides(recordings: Path,
 
 
 def test_an_unknown_dataset_is_told(recordings: Path) -> None:
-    with pytest.raises(UserError, match="unknown dataset 'kitti'; known are 7scenes, tum, rgbd-scenes-v1"):
-        open_sequence(recordings / "tum", "kitti")
+    with pytest.raises(UserError, match="unknown dataset 'scannet'; known are 7scenes, tum, rgbd-scenes-v1"):
+        open_sequence(recordings / "tum", "scannet")
 
 
 def test_samples_are_opened_by_name(recordings: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -148,3 +148,62 @@ def test_an_empty_cloud():
         cloud.add(make_frame(0.0), 0, np.eye(4))
         points, colors = cloud.assemble(HERE)
         assert points.shape == colors.shape == (0, 3)
+
+
+def seen_twice(T_wrong: np.ndarray) -> tuple[KeyframeCloud, np.ndarray]:
+    """Two images of one bumpy surface from one true pose, the second with a wrong one; and the true poses."""
+    cloud = KeyframeCloud(CONFIG)
+    cloud.add(make_frame(rough(4), 4), 0, np.eye(4))
+    cloud.add(make_frame(rough(4), 5), 1, T_wrong)
+    return cloud, np.tile(np.eye(4), (2, 1, 1))
+
+
+def jump() -> np.ndarray:
+    """30 cm and 10 degrees."""
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = Rotation.from_rotvec([0.0, np.radians(10.0), 0.0]).as_matrix(), [0.3, 0.0, 0.0]
+    return T
+
+
+def test_a_surface_that_was_seen_twice_is_there_once_after_the_correction():
+    cloud, true = seen_twice(jump())
+    once = KeyframeCloud(CONFIG)
+    once.add(make_frame(rough(4), 4), 0, np.eye(4))
+    assert len(cloud.assemble(true)[0]) > 1.5 * len(once.assemble(true)[0])
+    cloud.rebuild(true)
+    for found, expected in zip(cloud.assemble(true), once.assemble(true), strict=True):
+        np.testing.assert_array_equal(found, expected)  # the older image's points and colours
+
+
+def test_after_a_correction_known_places_refuse_points_and_the_wrong_ones_take_them():
+    cloud, true = seen_twice(jump())
+    cloud.rebuild(true)
+    count = len(cloud.assemble(true)[0])
+    poses = np.concatenate([true, true[:1], jump()[None]])
+    cloud.add(make_frame(rough(4), 6), 2, poses[2])
+    assert len(cloud.assemble(poses)[0]) == count
+    cloud.add(make_frame(rough(4), 7), 3, poses[3])
+    points, _ = cloud.assemble(poses)
+    assert len(points) > 1.5 * count and len(points) == cloud._count
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_rebuilt_cloud_has_one_point_a_voxel_wherever_the_poses_went(seed):
+    cloud = KeyframeCloud(CONFIG)
+    for keyframe in range(6):
+        cloud.add(make_frame(rough(keyframe), keyframe), keyframe, pose(10 * seed + keyframe, 0.1))
+    moved = np.array([pose(100 + 10 * seed + keyframe, 0.1) for keyframe in range(6)])
+    occupied = set(cells(cloud.assemble(moved)[0].astype(float)))
+    cloud.rebuild(moved)
+    points, colors = cloud.assemble(moved)
+    assert len(points) == len(colors) == cloud._count
+    assert len(points) == pytest.approx(len(occupied), abs=5)  # float32 points may lie on the other side of a border
+    cloud.rebuild(moved)
+    for found, expected in zip(cloud.assemble(moved), (points, colors), strict=True):
+        np.testing.assert_array_equal(found, expected)
+
+
+def test_an_empty_cloud_can_be_rebuilt():
+    cloud = KeyframeCloud(CONFIG)
+    cloud.rebuild(HERE)
+    assert cloud.assemble(HERE)[0].shape == (0, 3)
