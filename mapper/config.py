@@ -15,7 +15,68 @@ class OdometrySource(Enum):
     """Where the relative motion between keyframes comes from."""
 
     KISS_ICP = "kiss-icp"
-    POSES = "poses"
+    SMALL_GICP = "small-gicp"
+    POSES = "poses"  # the dataset's own
+    FILE = "file"  # a trajectory of another system, at `path`
+
+
+@dataclass(frozen=True, slots=True)
+class FlowConfig:
+    """Optical flow between neighbouring frames, at half resolution."""
+
+    corners: int = 250
+    quality: float = 0.01  # of the best corner's score
+    spacing: int = 7  # px of the small image, between corners
+    window: int = 15  # px
+    levels: int = 4  # of the pyramid: motions up to about 100 px of the small image
+    inlier_distance: float = 0.03  # m at 1 m and nearer, growing with z, as VisualConfig's
+    min_inliers: int = 20
+
+
+@dataclass(frozen=True, slots=True)
+class GicpConfig:
+    """small_gicp against a model of Gaussians, one a voxel; measured on 300 frames each of a render and redkitchen."""
+
+    spacing: float = 0.05  # m between the points of a frame
+    neighbours: int = 20  # points that a point's plane is fitted to; with 10, a table-top's noise lets it slip
+    voxel_size: float = 0.1  # m, of the model
+    correspondence: float = 0.3  # m, three voxels
+    max_iterations: int = 20
+    step: tuple[float, float] = (0.08, 0.05)  # rad, m: the model takes a frame in when the camera has moved this far
+    horizon: int = 100  # frames taken in, after which a voxel that nothing fell into is forgotten: 5 m of way
+    min_match: float = 0.5  # of a frame's points in the model, below which it is lost
+    degenerate_ratio: float = 0.02  # smallest / largest of the translation: walls .003, rooms from .05
+    inflation: float = 2.0  # of the point-to-plane covariance: both ends of a step were matched to the model
+    covariance_floor: tuple[float, float] = (0.0015, 0.0015)  # rad, m: median NEES per dof of redkitchen's steps 0.95
+    drift: tuple[float, float] = (0.01, 0.01)  # rad per rad turned, m per m moved
+    guess_sigma: tuple[float, float] = (0.02, 0.01)  # rad, m: a hand's 20 rad/s^2 and 10 m/s^2 over 1/30 s
+    image_sigma: tuple[float, float] = (0.003, 0.004)  # rad, m: of optical flow over a frame, 0.14 degrees and 2.7 mm
+    open_sigma: float = 0.1  # m, of a step along what its planes leave open: a hand's 1 m/s^2 over 0.5 s
+    lost_frames: int = 15  # lost in a row (0.5 s at 30 Hz), after which a new model begins
+    lost_sigma: tuple[float, float] = (0.5, 0.5)  # rad, m: what a hand may do unseen in that time
+
+
+@dataclass(frozen=True, slots=True)
+class LidarConfig:
+    """KISS-ICP on a LiDAR's sweeps, with its own defaults where it has any (Vizzo et al. 2023, table I)."""
+
+    max_range: float = 100.0  # m
+    min_range: float = 1.0  # m, nearer is what carries the scanner
+    voxel_size: float = 1.0  # m, of the map: a hundredth of max_range, as KISS-ICP has it
+    initial_threshold: float = 2.0  # m, first correspondence threshold
+    min_motion: float = 0.1  # m, motion below which the adaptive threshold does not learn
+    max_iterations: int = 500
+    deskew: bool = True  # take the motion within a sweep out, where its points have times
+    elevation_offset: float = 0.0  # rad, added to every point's; KITTI's scans are 0.0036 (0.205 degrees) too low
+    plane_radius: float = 1.5  # m, of the map around a point to which its plane is fitted
+    min_match: float = 0.3  # of a sweep's points on a plane of the map, below which it is lost
+    max_residual: float = 0.5  # m, robust deviation from those planes, above which it is lost
+    degenerate_ratio: float = 0.02  # of the translation's eigenvalues, as GicpConfig.degenerate_ratio
+    guess_sigma: tuple[float, float] = (0.02, 0.1)  # rad, m: a vehicle's 2 rad/s^2 and 10 m/s^2 over 0.1 s
+    lost_frames: int = 5  # lost in a row (0.5 s at 10 Hz), after which a new map begins
+    lost_sigma: tuple[float, float] = (0.2, 2.0)  # rad, m: what a vehicle may do unseen in that time
+    covariance_floor: tuple[float, float] = (0.001, 0.025)  # rad, m: NEES per dof of steps along a cast street 0.8
+    drift: tuple[float, float] = (0.005, 0.005)  # rad per rad turned, m per m moved
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,17 +84,29 @@ class OdometryConfig:
     """KISS-ICP on depth images: a preset measured on hand-held RGB-D, where its own defaults (for LiDAR) fail."""
 
     source: OdometrySource = OdometrySource.KISS_ICP
+    path: str = ""  # of a trajectory with `source: file`: rows `stamp tx ty tz qx qy qz qw`, camera to world
     pixel_step: int = 4  # every 4th pixel in both directions: 17k points of 640x480
     min_range: float = 0.3  # m, below it a Kinect reads nothing
     max_range: float = 3.5  # m; the range cap is decisive: depth noise grows with z^2
-    voxel_size: float = 0.08  # m
+    voxel_size: float = 0.12  # m; 0.08 took twice the time and led to the same refined poses
     initial_threshold: float = 0.1  # m, first correspondence threshold
     min_motion: float = 0.005  # m, motion below which the adaptive threshold does not learn
-    max_iterations: int = 50
+    max_iterations: int = 10  # the pose is refined afterwards; 50 changed nothing but the time
     threads: int = 2
     covariance_floor: tuple[float, float] = (0.003, 0.005)  # rad, m: makes NEES per dof of real keyframe steps about 1
     drift: tuple[float, float] = (0.01, 0.01)  # rad per rad turned, m per m moved: scan-to-map drift between keyframes
     pose_sigma: tuple[float, float] = (0.002, 0.004)  # rad, m: noise of given poses taken as measurements
+    path_sigma: tuple[float, float] = (0.003, 0.005)  # rad, m: noise of a step of the trajectory at `path`
+    path_drift: tuple[float, float] = (0.01, 0.01)  # its growth: rad per rad turned, m per m moved
+    gicp: GicpConfig = field(default_factory=GicpConfig)
+    flow: FlowConfig = field(default_factory=FlowConfig)
+    lidar: LidarConfig = field(default_factory=LidarConfig)
+
+    def __post_init__(self) -> None:
+        if (self.source is OdometrySource.FILE) != bool(self.path):
+            raise ValueError(
+                f"source {self.source.value} with path {self.path!r}; `file` needs a path, others have none"
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,12 +125,65 @@ class VisualConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class ScanConfig:
+    """Matching the depth of two keyframes by GICP; measured on rendered hand-held sequences and redkitchen."""
+
+    spacing: float = 0.03  # m between points: 1.4 mm median error; 0.04: 1.9, 0.025: 1.2 at twice the time
+    neighbours: int = 20  # points that a point's plane is fitted to; with 10 a table-top's noise lets it slip
+    reaches: tuple[float, ...] = (0.08, 0.04)  # m, partners are looked for within, first and last
+    max_iterations: int = 20  # each
+    min_share: float = 0.4  # of the smaller scan's points that must have a partner
+    inflation: float = 1.0  # of the point-to-plane covariance
+    covariance_floor: tuple[float, float] = (0.0005, 0.001)  # rad, m
+
+
+@dataclass(frozen=True, slots=True)
 class KeyframeConfig:
     """A frame becomes a keyframe when the camera has moved this far from the last one."""
 
     translation: float = 0.06  # m; about 3 degrees of parallax at 1.2 m
     rotation: float = 0.09  # rad (5 degrees)
     max_gap: int = 15  # frames (0.5 s at 30 Hz): a still camera still contributes
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceConfig:
+    """Keyframes recognised by appearance; numbers from benchmarks/places.py."""
+
+    votes: int = 5  # keyframes that a feature votes for; 3 to 8 are alike
+    max_distance: int = 63  # bits of 256 between a feature and one it votes for; 55 finds less, 70 nothing more
+    max_comparisons: int = 150_000  # of features in a query, 3 ms; beyond it those of rare words are asked alone
+    neighbours: int = 2  # keyframes on both sides of a better one that are not named beside it
+    unseen: int = 20  # keyframes added to the average without a vote: a few keyframes of one place are no background
+    min_score: float = 0.015  # share of features; nine of ten revisits of a recorded kitchen score more
+
+
+@dataclass(frozen=True, slots=True)
+class ConstellationConfig:
+    """Things that were mapped twice, once before and once after the camera drifted, recognised by how they lie."""
+
+    recent_keyframes: int = 60  # a recent thing was first seen within these; about a quarter of a lap of two rooms
+    old_keyframes: int = 60  # an old thing was not seen within these
+    min_existence: float = 0.7  # only things one is sure of
+    min_matches: int = 3  # things; with two any pair of cups lies on any other
+    sigma_position: float = 0.02  # m, floor of a centre's noise against its neighbours
+    sigma_extent: float = 0.15  # of the mean half axis: a centre moves when the thing is seen from another side
+    sigma_limit: float = 0.1  # m, above which a thing's place among its neighbours says too little: cut down to it
+    sigma_size: float = 0.35  # log units between two boxes of one thing, as in LifecycleConfig.merge_log_size
+    sigma_tilt: float = 0.03  # rad, of the correction against gravity: UpConfig.upright_tolerance
+    gate: float = 11.34  # chi-square, 3 degrees of freedom, 99 %
+    min_baseline: float = 0.2  # m, horizontal, between the two pairs that a correction is first made from
+    class_error: float = 0.1  # probability that a class posterior says nothing
+    min_class_ratio: float = 0.5  # of one class against any two, below which a pair is not tried; 0.19 at least
+    detection: float = 0.6  # probability that a thing in view becomes a confident landmark again
+    seen_before: float = 0.5  # prior share of recent things that are old ones, where the camera is at a known place
+    view_radius: float = 0.5  # m around recent things within which an old one should have been mapped again
+    spread: float = 0.1  # m, added to how far things are spread, for few of them
+    prior_log_odds: float = -2.2  # that the camera is at a known place: 0.1
+    min_log_odds: float = 2.0  # from which a correction is believed: 0.88; in made-up rooms 99 % of these are right
+    max_pairs: int = 1500  # compatible pairs that are looked at, the most telling first
+    max_corrections: int = 24  # weighed against each other
+    max_candidates: int = 3  # pairs of keyframes proposed for a correction
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +194,7 @@ class UpConfig:
     plane_sigma: float = 0.2  # rad; a room's normals are off by 1-4 degrees together, so each must say little
     accelerometer_sigma: float = 0.08  # rad, hand accelerations of about 0.8 m/s^2
     gravity_sigma: float = 0.01  # rad, a gravity file
+    scanner_sigma: float = 0.1  # rad, a LiDAR stands upright on what carries it
     max_tilt: float = 0.8  # rad, planes further than this from the current up are not supports (walls)
     min_plane_share: float = 0.06  # of the valid pixels
     every: int = 2  # keyframes between plane searches (9 ms each)
@@ -88,6 +215,7 @@ class LiftingConfig:
     sigma_relative: float = 0.06  # of the box's side lengths: noise of a box side grows with the box
     sigma_tangential: float = 0.3  # of the half extents: a box's centre is this close to the object's
     sigma_range: float = 1.5  # of the object's assumed half depth; views share the error, so each must say little
+    noise_floor: float = 0.0  # m, the sensor's at any range: a LiDAR's 0.02
     sensor_noise: float = 0.0028  # m at 1 m, growing with z^2 (Khoshelham and Elberink 2012: 1.425 mm/m^2 a reading)
 
 
@@ -224,7 +352,10 @@ class MapperConfig:
     class_sizes: str = ""  # path of an own YAML of class sizes, added to the shipped one
     odometry: OdometryConfig = field(default_factory=OdometryConfig)
     visual: VisualConfig = field(default_factory=VisualConfig)
+    scans: ScanConfig = field(default_factory=ScanConfig)
     keyframes: KeyframeConfig = field(default_factory=KeyframeConfig)
+    places: PlaceConfig = field(default_factory=PlaceConfig)
+    constellation: ConstellationConfig = field(default_factory=ConstellationConfig)
     up: UpConfig = field(default_factory=UpConfig)
     lifting: LiftingConfig = field(default_factory=LiftingConfig)
     association: AssociationConfig = field(default_factory=AssociationConfig)

@@ -14,15 +14,8 @@ from .sources import DatasetOption, MaxFramesOption, SequenceArgument, StrideOpt
 if TYPE_CHECKING:
     from ...datasets.sequence import Sequence
     from ...detectors.detector import Detector
-    from ..config import MapperConfig
+    from ..config import MapperConfig, OdometryConfig
     from ..runner import Mapper
-
-
-class Odometry(StrEnum):
-    """Where camera motion comes from; the values are `OdometrySource`'s, which takes longer to import."""
-
-    KISS_ICP = "kiss-icp"
-    POSES = "poses"
 
 
 class Inference(StrEnum):
@@ -42,7 +35,14 @@ def run(
         str | None,
         typer.Option(metavar="SPEC", help="simulated, recorded:FILE, onnx:MODEL, ...; the sequence's own by default."),
     ] = None,
-    odometry: Annotated[Odometry | None, typer.Option(help="Camera motion from depth, or the given poses.")] = None,
+    odometry: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SOURCE",
+            help="Camera motion: kiss-icp or small-gicp from depth, the sequence's own poses, or a file "
+            "of another system with rows stamp tx ty tz qx qy qz qw; kiss-icp by default.",
+        ),
+    ] = None,
     dataset: DatasetOption = None,
     config: Annotated[Path | None, typer.Option(metavar="FILE", help="YAML over the defaults.")] = None,
     inference: Annotated[
@@ -71,6 +71,7 @@ def run(
     from ...datasets.open import open_sequence
     from ...detectors.spec import make_detector
     from ..config_file import dump_config
+    from ..lidar_config import default_config
     from ..map.store import OutputFolder
     from ..snapshots import parse_snapshot_frames
     from .job import MappingJob
@@ -80,10 +81,9 @@ def run(
             f"--views {views}: only of use with --inference {Inference.BATCH}; add it, or leave out --views"
         )
     OutputFolder.check(output, overwrite)
-    settings = _settings(config, seed, odometry)
     frames = open_sequence(sequence, dataset=dataset, stride=stride, max_frames=max_frames)
-    if settings.odometry.source.value == Odometry.POSES and frames.poses is None:
-        raise UserError(f"{sequence}: the sequence has no poses; use --odometry {Odometry.KISS_ICP}")
+    settings = _settings(config, seed, odometry, default_config(frames))
+    _check_odometry(settings.odometry, frames, sequence)
     spec = choose_detector(detector, sequence, frames)
     detect = make_detector(spec, frames)
     MappingJob(
@@ -120,14 +120,27 @@ def _make_mapper(
     return SemanticMapper(detect, settings, **about)
 
 
-def _settings(config: Path | None, seed: int | None, odometry: Odometry | None) -> MapperConfig:
-    """The configuration file with the command line over it."""
-    from ..config import MapperConfig, OdometrySource
-    from ..config_file import load_config
+def _check_odometry(odometry: OdometryConfig, frames: Sequence, sequence: str) -> None:
+    """That the poses it takes from elsewhere are there, before a folder is made."""
+    from ...datasets.errors import UserError
+    from ..config import OdometrySource
+    from ..trajectory.given_odometry import check_trajectory
 
-    settings = load_config(config, MapperConfig)
+    if odometry.source is OdometrySource.POSES and frames.poses is None:
+        raise UserError(f"{sequence}: the sequence has no poses; use --odometry {OdometrySource.KISS_ICP.value}")
+    if odometry.source is OdometrySource.FILE:
+        check_trajectory(Path(odometry.path), frames.stamps)
+
+
+def _settings(config: Path | None, seed: int | None, odometry: str | None, base: MapperConfig) -> MapperConfig:
+    """The configuration file over the defaults of this kind of sequence, with the command line over it."""
+    from ..config import MapperConfig
+    from ..config_file import load_config
+    from ..trajectory.odometry_sources import with_source
+
+    settings = load_config(config, MapperConfig, base)
     if seed is not None:
         settings = replace(settings, seed=seed)
     if odometry is not None:
-        settings = replace(settings, odometry=replace(settings.odometry, source=OdometrySource(odometry.value)))
+        settings = replace(settings, odometry=with_source(settings.odometry, odometry))
     return settings

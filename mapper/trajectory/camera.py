@@ -14,10 +14,10 @@ from ..map.upright import upright_rotation
 from .features import FeatureExtractor
 from .keyframes import FrameTrajectory, KeyframeSelector
 from .odometry_sources import make_odometry
-from .up import UpMeasurement, camera_prior, from_accelerometer, from_planes
+from .up import UpMeasurement, camera_prior, from_accelerometer, from_planes, scanner_prior
 from .visual import VisualOdometry
 
-UP_SOURCES = ("gravity file", "accelerometer", "planes", "camera prior")  # the best first
+UP_SOURCES = ("gravity file", "accelerometer", "planes", "LiDAR axis", "camera prior")  # the best first
 GAUGE_SIGMAS = np.repeat([1e-3, 1e-3], 3)  # rad, m: the first camera defines the world
 
 
@@ -68,6 +68,8 @@ class CameraGraph:
         """
         if self.started and frame.intrinsics != self.intrinsics:
             raise BrokenFrame(frame.name, FrameProblem.OTHER_CAMERA)
+        if not self.started:
+            self._odometry = make_odometry(self._config.odometry, frame.scan is not None)
         self._T_odometry_camera = self._odometry.register(frame).T_odometry_camera
         if self._selector.is_keyframe(self._T_odometry_camera) or not self.started:
             return True
@@ -114,7 +116,8 @@ class CameraGraph:
 
     def _start(self, frame: Frame) -> np.ndarray:
         """The world: the dataset's with given poses, gravity-aligned where gravity is known, else the first camera."""
-        up = from_accelerometer(frame, self._config.up) or camera_prior(self._config.up)
+        config = self._config.up
+        up = from_accelerometer(frame, config) or scanner_prior(frame, config) or camera_prior(config)
         T = np.eye(4)
         if self.map_frame is MapFrame.DATASET:
             T = self._T_odometry_camera
@@ -134,7 +137,7 @@ class CameraGraph:
         config, smoother = self._config.up, self.smoother
         # the first reading made the world's axes already
         measured: list[UpMeasurement | None] = [from_accelerometer(frame, config) if keyframe > 0 else None]
-        if self._gravity is None and keyframe % config.every == 0:
+        if self._gravity is None and frame.scan is None and keyframe % config.every == 0:
             expected = T_world_camera[:3, :3].T @ smoother.R_world_upright[:, 2]
             measured.append(from_planes(frame, expected, config))
         for up in measured:

@@ -28,22 +28,45 @@ class RelativePose:
     inliers: int
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class RobustMotion:
+    """The motion that most pairs of points agree on: (4, 4) `T`, and (M,) bool which pairs do."""
+
+    T: np.ndarray
+    inliers: np.ndarray
+
+
 def relative_pose(a: Features, b: Features, config: VisualConfig, seed: int = 0) -> RelativePose | None:
     """Pose of frame b in frame a; None where fewer than `config.min_inliers` matches agree on one."""
     source, target = _match(a, b, config.ratio)
-    if len(source) < config.min_inliers:
+    fit = robust_motion(source, target, config.inlier_distance, config.min_inliers, seed)
+    if fit is None:
         return None
-    inliers = _ransac(source, target, config.inlier_distance, seed)
-    T_a_b = np.eye(4)
+    covariance = _covariance(fit.T, source[fit.inliers], target[fit.inliers], config.covariance_floor)
+    return RelativePose(fit.T, covariance, int(fit.inliers.sum()))
+
+
+def robust_motion(
+    source: np.ndarray, target: np.ndarray, distance: float, min_inliers: int, seed: int = 0
+) -> RobustMotion | None:
+    """The motion that takes most of `source` to `target`: RANSAC, then weighted least squares.
+
+    Args:
+        source, target: (M, 3) metres, camera frames.
+        distance: metres at 1 m and nearer, growing with z, up to which a pair agrees.
+        min_inliers: pairs that must agree, else the answer is None.
+        seed: of the samples.
+    """
+    if len(source) < min_inliers:
+        return None
+    inliers = _ransac(source, target, distance, seed)
+    T = np.eye(4)
     for _ in range(3):
-        if inliers.sum() < config.min_inliers:
+        if inliers.sum() < min_inliers:
             return None
-        T_a_b = rigid_motion(source[inliers], target[inliers], _weights(target[inliers]))
-        inliers = _agree(T_a_b, source, target, config.inlier_distance)
-    if inliers.sum() < config.min_inliers:
-        return None
-    covariance = _covariance(T_a_b, source[inliers], target[inliers], config.covariance_floor)
-    return RelativePose(T_a_b, covariance, int(inliers.sum()))
+        T = rigid_motion(source[inliers], target[inliers], _weights(target[inliers]))
+        inliers = _agree(T, source, target, distance)
+    return RobustMotion(T, inliers) if inliers.sum() >= min_inliers else None
 
 
 def _match(a: Features, b: Features, ratio: float) -> tuple[np.ndarray, np.ndarray]:

@@ -18,6 +18,14 @@ def rotation_angle(R: np.ndarray) -> float:
     return float(np.arccos(np.clip((np.trace(R) - 1.0) / 2.0, -1.0, 1.0)))
 
 
+def nearest_rigid(T: np.ndarray) -> np.ndarray:
+    """(4, 4) with its rotation made orthonormal: errors of rounding grow where each pose starts the next."""
+    U, _, Vt = np.linalg.svd(T[:3, :3])
+    result = T.copy()
+    result[:3, :3] = U @ Vt
+    return result
+
+
 def rigid_motion(source: np.ndarray, target: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Weighted least-squares motion that takes `source` to `target` (Umeyama 1991, without scale).
 
