@@ -46,9 +46,11 @@ class GicpConfig:
     horizon: int = 100  # frames taken in, after which a voxel that nothing fell into is forgotten: 5 m of way
     min_match: float = 0.5  # of a frame's points in the model, below which it is lost
     degenerate_ratio: float = 0.02  # smallest / largest of the translation: walls .003, rooms from .05
-    inflation: float = 2.0  # of the point-to-plane covariance: both ends of a step were matched to the model
-    covariance_floor: tuple[float, float] = (0.0015, 0.0015)  # rad, m: median NEES per dof of redkitchen's steps 0.95
-    drift: tuple[float, float] = (0.01, 0.01)  # rad per rad turned, m per m moved
+    # of a step: set so that, on rendered hand-held sequences, NEES per dof of poses 1, 5 and 20 keyframes apart, by all
+    # links together, is 0.7, 1.1 and 1.4; steps by themselves then have 0.5
+    inflation: float = 0.5  # of the point-to-plane covariance, which takes a sample of the points
+    covariance_floor: tuple[float, float] = (0.0005, 0.0008)  # rad, m
+    drift: tuple[float, float] = (0.003, 0.003)  # rad per rad turned, m per m moved
     guess_sigma: tuple[float, float] = (0.02, 0.01)  # rad, m: a hand's 20 rad/s^2 and 10 m/s^2 over 1/30 s
     image_sigma: tuple[float, float] = (0.003, 0.004)  # rad, m: of optical flow over a frame, 0.14 degrees and 2.7 mm
     open_sigma: float = 0.1  # m, of a step along what its planes leave open: a hand's 1 m/s^2 over 0.5 s
@@ -121,6 +123,7 @@ class VisualConfig:
     inlier_distance: float = 0.03  # m at 1 m and nearer, growing with z: three times a Kinect's depth noise at 2 m
     min_inliers: int = 30
     depth_range: tuple[float, float] = (0.3, 4.0)  # m
+    gate: float = 22.46  # chi-square, 6 degrees of freedom, 99.9 %: odometry that contradicts features is doubted
     covariance_floor: tuple[float, float] = (0.003, 0.004)  # rad, m: colour is only roughly registered to depth
 
 
@@ -133,8 +136,30 @@ class ScanConfig:
     reaches: tuple[float, ...] = (0.08, 0.04)  # m, partners are looked for within, first and last
     max_iterations: int = 20  # each
     min_share: float = 0.4  # of the smaller scan's points that must have a partner
-    inflation: float = 1.0  # of the point-to-plane covariance
-    covariance_floor: tuple[float, float] = (0.0005, 0.001)  # rad, m
+    inflation: float = 0.35  # of the point-to-plane covariance: all points were matched, not its sample
+    covariance_floor: tuple[float, float] = (0.0003, 0.0005)  # rad, m
+
+
+@dataclass(frozen=True, slots=True)
+class HybridConfig:
+    """Open3D's hybrid RGB-D odometry between keyframes; measured on rendered hand-held pairs and redkitchen."""
+
+    enabled: bool = True  # of use where geometry is degenerate only
+    iterations: tuple[int, ...] = (20, 10, 5, 2)  # coarsest to full resolution; with three levels 20 px are too far
+    max_distance: float = 0.07  # m between two depths of one pixel, beyond which one hides the other
+    depth_range: tuple[float, float] = (0.3, 4.5)  # m
+    min_share: float = 0.5  # of b's depth readings that must agree
+    max_shift: float = 1.5  # px between edges of equal brightness: right motions at most 0.3 (rendered), wrong ones 2-9
+    min_inliers: int = 1000  # pixels
+    max_correction: tuple[float, float] = (0.3, 0.3)  # rad, m: an answer this far from the guess is a wrong one
+    pixel_step: int = 4  # px between the points that the covariance is computed from
+    blur: float = 1.5  # px, before brightness gradients are taken
+    min_gradient: float = 1.0  # grey levels a pixel, what noise leaves after that blur
+    # pixels of brightness, of depth, that count as independent: NEES per dof 0.95 on rendered pairs of a wall, 1.7 on
+    # redkitchen (its poses taken as known to 4 mrad, 5 mm), where colour lies beside depth; 0.1 on a rendered table-top
+    samples: tuple[int, int] = (30, 4)
+    covariance_floor: tuple[float, float] = (0.0002, 0.0002)  # rad, m
+    guess_sigma: tuple[float, float] = (0.1, 0.2)  # rad, m, where nothing is to be seen
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,6 +169,7 @@ class KeyframeConfig:
     translation: float = 0.06  # m; about 3 degrees of parallax at 1.2 m
     rotation: float = 0.09  # rad (5 degrees)
     max_gap: int = 15  # frames (0.5 s at 30 Hz): a still camera still contributes
+    lost_gap: int = 5  # frames while LOST: the motion is a guess, and images a few frames apart may bridge it
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,6 +182,33 @@ class PlaceConfig:
     neighbours: int = 2  # keyframes on both sides of a better one that are not named beside it
     unseen: int = 20  # keyframes added to the average without a vote: a few keyframes of one place are no background
     min_score: float = 0.015  # share of features; nine of ten revisits of a recorded kitchen score more
+
+
+@dataclass(frozen=True, slots=True)
+class LoopConfig:
+    """Links between keyframes that are not neighbours: by depth where it is known where they are, else by the image."""
+
+    enabled: bool = True
+    appearance: bool = True  # places are recognised by their images
+    constellation: bool = True  # and by the things in them
+    process: bool = True  # matching is done by another process; off: here, with the same result
+    lag: int = 5  # keyframes after which links enter the graph: 1 s, in which the other process makes them
+    place_spacing: tuple[float, float] = (0.1, 0.1)  # rad, m: a keyframe is remembered if no place is as near
+    reach: tuple[float, float] = (0.5, 0.5)  # rad, m, within which two views overlap enough to be matched by depth
+    skip: int = 3  # keyframes between ends of a link; nearer ones are tied by odometry
+    ages: tuple[int, ...] = (8, 40)  # keyframes: a link each to the nearest place younger, in between, and older
+    known: tuple[float, float] = (0.03, 0.05)  # rad, m: deviation of a relative pose up to which depth needs no image
+    gate: float = 22.46  # chi-square, 6 degrees of freedom, 99.9 %: a link this far from the estimate is refused
+    gate_floor: tuple[float, float] = (0.005, 0.01)  # rad, m: of the estimate, for what its covariance leaves out
+    candidates: int = 3  # places that look alike, verified for a keyframe
+    min_age: int = 30  # keyframes, from which a place that looks alike closes a loop
+    min_inliers: int = 25  # matched features that agree on one motion
+    agreement: tuple[float, float] = (0.05, 0.08)  # rad, m: between the motions by features and by depth
+    check_every: int = 20  # keyframes between checks of all loops by GNC, if there are new ones
+    check_lag: int = 10  # keyframes until a check's verdict enters the graph
+    probability: float = 0.9999  # with which a right loop passes the check
+    patience: int = 60  # keyframes without a known place after which the map goes on from a guessed one
+    constellation_every: int = 10  # keyframes
 
 
 @dataclass(frozen=True, slots=True)
@@ -353,7 +406,9 @@ class MapperConfig:
     odometry: OdometryConfig = field(default_factory=OdometryConfig)
     visual: VisualConfig = field(default_factory=VisualConfig)
     scans: ScanConfig = field(default_factory=ScanConfig)
+    hybrid: HybridConfig = field(default_factory=HybridConfig)
     keyframes: KeyframeConfig = field(default_factory=KeyframeConfig)
+    loops: LoopConfig = field(default_factory=LoopConfig)
     places: PlaceConfig = field(default_factory=PlaceConfig)
     constellation: ConstellationConfig = field(default_factory=ConstellationConfig)
     up: UpConfig = field(default_factory=UpConfig)

@@ -24,6 +24,7 @@ from ..factors.size_prior import ClassSizePriors, load_size_priors
 from ..factors.visibility import Visibility
 from .config import MapperConfig
 from .estimation.association import Assignment, Targets, associate
+from .estimation.corrections import Followers
 from .estimation.evidence import Observer, class_evidence, score_evidence
 from .estimation.landmarks import Landmark
 from .estimation.lifecycle import Lifecycle
@@ -90,6 +91,7 @@ class SemanticMapper:
         self._priors: ClassSizePriors | None = None
         self._lifecycle: Lifecycle | None = None
         self._observer: Observer | None = None
+        self._followers: Followers | None = None
         self._model: EvidenceModel | None = None
 
     def process_frame(self, frame: Frame, detections: Detections | None = None) -> MapUpdate:
@@ -112,6 +114,8 @@ class SemanticMapper:
             with self._clock.stage("keyframe"):
                 view = self._camera.add_keyframe(frame)
             self._map(view, self._lift(found, frame))
+            with self._clock.stage("links"):
+                self._camera.match_keyframe()
             with self._clock.stage("cloud"):
                 self._cloud.add(frame, view.keyframe, self._camera.smoother.pose(view.keyframe))
         return MapUpdate(frame.index, is_keyframe, self._camera.pose(), self._count_things())
@@ -121,19 +125,38 @@ class SemanticMapper:
         stage = self._clock.stage
         assert self._lifecycle is not None and self._observer is not None
         lifecycle, observer, smoother = self._lifecycle, self._observer, self._camera.smoother
+        if not view.placed:
+            self._outcomes[Outcome.ADRIFT] += len(lifted)
+            return self._solve()
         targets, visibility, scores, assignment = self._associate(view, lifted)
         with stage("factors"):
             touched = observer.observe(view, lifted, assignment, targets, visibility)
             lifecycle.start_tracks(view, lifted, scores, assignment)
             promoted = lifecycle.promote_and_drop()
-        with stage("smoothing"):
-            smoother.update()
+        self._solve()
         with stage("beliefs"):
             lifecycle.refresh(touched | promoted)
         with stage("lifecycle"):
             if promoted or view.keyframe % self.config.lifecycle.merge_every == 0:
                 lifecycle.merge()
             lifecycle.retire()
+
+    def _solve(self) -> None:
+        """The graph with all that is new; what is not in it follows where poses were corrected."""
+        assert self._followers is not None
+        smoother = self._camera.smoother
+        with self._clock.stage("smoothing"):
+            smoother.update()
+        with self._clock.stage("corrections"):
+            if self._followers.follow():
+                self._cloud.rebuild(smoother.poses())
+
+    def _finish(self) -> None:
+        """Everything that is still being worked on enters the map, for its reader; a second time changes nothing."""
+        if self._camera.started and self._followers is not None:
+            self._camera.finish()
+            if self._camera.smoother.is_pending:
+                self._solve()
 
     def _associate(
         self, view: View, lifted: list[LiftedDetection]
@@ -152,6 +175,7 @@ class SemanticMapper:
 
     def landmarks(self, include_retired: bool = False) -> tuple[Landmark, ...]:
         """Landmarks as estimated now, for those who want to know more of them than a map tells."""
+        self._finish()
         if self._lifecycle is not None:
             self._lifecycle.bring_up_to_date()
         retired = self._scene.retired.values() if include_retired else ()
@@ -171,6 +195,7 @@ class SemanticMapper:
 
     def trajectory(self) -> tuple[np.ndarray, np.ndarray]:
         """(N,) stamps and (N, 4, 4) `T_world_camera` of every processed frame, as estimated now."""
+        self._finish()
         return self._camera.trajectory()
 
     def keyframes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -178,10 +203,12 @@ class SemanticMapper:
 
         Covariances are relative to the first camera, which defines the world.
         """
+        self._finish()
         return self._camera.keyframes()
 
     def cloud(self) -> tuple[np.ndarray, np.ndarray]:
         """(M, 3) float32 points, world, metres, and (M, 3) uint8 RGB, one a voxel."""
+        self._finish()
         poses = self._camera.smoother.poses() if self._camera.started else np.empty((0, 4, 4))
         return self._cloud.assemble(poses)
 
@@ -196,6 +223,7 @@ class SemanticMapper:
             "graph_rebuilds": smoother.rebuilds if smoother else 0,
             "ledger_records": len(smoother.ledger) if smoother else 0,
             "evidence_model": self._model.learned_from if self._model else "none was needed",
+            **self._camera.statistics(),
             "outcomes": {outcome.name.lower(): self._outcomes[outcome] for outcome in Outcome},
             "stages": self._clock.summary(),
         }
@@ -207,6 +235,8 @@ class SemanticMapper:
             self._camera.smoother.ledger.save(path, {"intrinsics": asdict(k), "classes": list(self._classes or ())})
 
     def _detect(self, frame: Frame, detections: Detections | None) -> Detections:
+        if detections is None and not frame.has_image:
+            detections = Detections.empty(self._classes or ())
         if detections is None:
             if self._detector is None:
                 raise UserError("no detections: give the mapper a detector, or process_frame the frame's detections")
@@ -236,6 +266,7 @@ class SemanticMapper:
         self._observer = Observer(self._scene, smoother, model, self.config.evidence, self._outcomes)
         members = self._scene, smoother, self._observer
         self._lifecycle = Lifecycle(*members, priors, model, self.config, self._outcomes)
+        self._followers = Followers(self._scene, smoother, self._lifecycle, self.config.tracks)
 
     def _count_things(self) -> int:
         return sum(landmark.belief.existence >= PROBABLE for landmark in self._scene.landmarks.values())

@@ -76,6 +76,7 @@ class BatchMapper(SemanticMapper):
             with self._clock.stage("keyframe"):
                 view = self._camera.add_keyframe(frame)
                 self._camera.smoother.update()
+                self._camera.match_keyframe()
             if found is not None:
                 self._stored.append(StoredView.of(frame, view.keyframe, self._lift(found, frame)))
             with self._clock.stage("cloud"):
@@ -141,7 +142,7 @@ class BatchMapper(SemanticMapper):
         self._drop_unmeasured()
         self._date_landmarks()
         self._lifecycle.bring_up_to_date()
-        self._lifecycle.merge()
+        self._lifecycle.merge(all_seen=True)
         self._lifecycle.retire()
         self._lifecycle.bring_up_to_date()
 

@@ -149,7 +149,7 @@ class Observer:
         place, belief = view.T_world_camera[:3, 3] - member.position, member.belief
         hits, misses, free, depth = (float(x[m]) for x in (looks.hits, looks.misses, looks.free, looks.depth))
         belief.look_for(place, float(looks.free_ratio[m]), float(looks.seen[m]), bool(looks.detected[m]))
-        belief.look(place, hits, misses, free, depth, float(looks.seen[m]), looks.scores[m])
+        belief.look(place, hits, misses, free, depth, float(looks.seen[m]), looks.scores[m], view.keyframe)
         if isinstance(member, Landmark):
             visible = np.asarray(looks.visible[m], dtype=np.float32)
             seen = float(looks.seen[m])

@@ -68,6 +68,16 @@ class DropLoop:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class ScanMatch:
+    """Motion between keyframes `a` and `b` from their depth: (4, 4) `T_a_b`, (6, 6) covariance."""
+
+    a: int
+    b: int
+    T_a_b: np.ndarray
+    covariance: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class UpPrior:
     """What is known of the world's up direction beforehand: (3,) unit vector, world axes; sigma in rad."""
 
@@ -179,6 +189,7 @@ Record = (
     Gauge
     | Motion
     | Visual
+    | ScanMatch
     | Loop
     | DropLoop
     | UpPrior
@@ -193,8 +204,10 @@ Record = (
     | Retire
 )
 KINDS: tuple[type, ...] = (
-    Gauge, Motion, Visual, Loop, DropLoop, UpPrior, Up, NewLandmark, DepthCentre, Box, Look, Scores, Site, Merge, Retire
+    Gauge, Motion, Visual, ScanMatch, Loop, DropLoop, UpPrior, Up,
+    NewLandmark, DepthCentre, Box, Look, Scores, Site, Merge, Retire,
 )  # fmt: skip
+Link = Motion | Visual | ScanMatch | Loop  # between two keyframes
 
 
 class Ledger:

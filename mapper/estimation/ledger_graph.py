@@ -46,9 +46,14 @@ class LedgerGraph(Estimates):
         """The landmark that this one has been merged into, itself if none."""
         return self._live.owner(landmark)
 
+    @property
+    def is_pending(self) -> bool:
+        """Whether something waits to be solved."""
+        return self._graph.is_pending
+
     def settle(self) -> None:
         """Solves what is still queued, if anything."""
-        if self._graph.is_pending:
+        if self.is_pending:
             self.update()
 
     def update(self) -> None:

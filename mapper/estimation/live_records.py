@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from .ledger import Box, DepthCentre, DropLoop, Ledger, Loop, Motion, NewLandmark, Record, Visual
+from .ledger import Box, DepthCentre, DropLoop, Ledger, Link, Loop, Motion, NewLandmark, Record, ScanMatch, Visual
 
 
 class LiveRecords:
@@ -13,7 +13,7 @@ class LiveRecords:
     def __init__(self) -> None:
         self._of_landmark: dict[int, list[int]] = {}  # live landmark -> numbers of its records, its birth first
         self._merged_into: dict[int, int] = {}
-        self._links: dict[int, Motion | Visual | Loop] = {}
+        self._links: dict[int, Link] = {}
         self._dropped: set[int] = set()
 
     def add(self, number: int, record: Record) -> None:
@@ -23,7 +23,7 @@ class LiveRecords:
                 self._of_landmark[record.landmark] = [number]
             case DepthCentre() | Box():
                 self._of_landmark[self.owner(record.landmark)].append(number)
-            case Motion() | Visual() | Loop():
+            case Motion() | Visual() | ScanMatch() | Loop():
                 self._links[number] = record
             case DropLoop():
                 self._dropped.add(record.record)
@@ -52,7 +52,7 @@ class LiveRecords:
         """Loop closures in the graph by their numbers."""
         return {number: link for number, link in self._links.items() if isinstance(link, Loop)}
 
-    def links(self) -> list[Motion | Visual | Loop]:
+    def links(self) -> list[Link]:
         """All measured motions between keyframes."""
         return list(self._links.values())
 

@@ -17,6 +17,7 @@ class Outcome(Enum):
     TRACKED = "detection of a candidate"
     DUPLICATE = "second box on the same object"
     NEW_TRACK = "detection that starts a candidate"
+    ADRIFT = "detection while the camera did not know its place"
     # candidates
     PROMOTED = "candidate became a landmark"
     REJECTED_MISSED = "candidate dropped: missed where it should have been seen"

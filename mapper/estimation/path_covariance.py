@@ -13,12 +13,12 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from ..trajectory.rigid import inverse
-from .ledger import Loop, Motion, Visual
+from .ledger import Link
 
 LEVER = 2.0  # m, to what a camera sees: what weighs a path's rotation against its translation
 
 
-def path_covariances(poses: np.ndarray, links: list[Motion | Visual | Loop], b: int) -> np.ndarray:
+def path_covariances(poses: np.ndarray, links: list[Link], b: int) -> np.ndarray:
     """Bounds on the covariance of keyframe `b` as seen from every other.
 
     Args:

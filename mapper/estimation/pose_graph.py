@@ -20,22 +20,26 @@ import numpy as np
 from gtsam.symbol_shorthand import X
 
 from ...factors.odometry import between_factor, gauge_prior, pose3
-from .ledger import DropLoop, Gauge, Ledger, Loop, Motion, Visual
+from .ledger import DropLoop, Gauge, Ledger, Link, Loop, Motion, ScanMatch, Visual
 
 INLIER_WEIGHT = 0.5  # weights are 0 or 1 when it has converged
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseGraph:
-    """Where the first keyframe is, odometry, and what is in question, by its number in the ledger."""
+    """Where the first keyframe is, odometry and what is trusted like it, and what is in question, by its number."""
 
     gauge: Gauge
-    motions: tuple[Motion, ...]
-    questioned: dict[int, Loop | Visual]
+    motions: tuple[Link, ...]
+    questioned: dict[int, Link]
 
     @classmethod
-    def of(cls, ledger: Ledger) -> PoseGraph:
+    def of(cls, ledger: Ledger, questioned: tuple[type, ...] = (Loop,)) -> PoseGraph:
         """What of a ledger is in the graph now.
+
+        Args:
+            ledger: of a map.
+            questioned: kinds of links that may be wrong; neighbours' are checked against odometry as they come.
 
         Raises:
             ValueError: the ledger has no first keyframe.
@@ -43,10 +47,14 @@ class PoseGraph:
         gauges = [record for record in ledger if isinstance(record, Gauge)]
         if not gauges:
             raise ValueError("a pose graph needs a first keyframe, but the ledger has none")
-        motions = tuple(record for record in ledger if isinstance(record, Motion))
         dropped = {record.record for record in ledger if isinstance(record, DropLoop)}
-        numbered = ((i, record) for i, record in enumerate(ledger) if isinstance(record, Loop | Visual))
-        return cls(gauges[0], motions, {i: record for i, record in numbered if i not in dropped})
+        links = {
+            number: record
+            for number, record in enumerate(ledger)
+            if isinstance(record, Motion | Visual | ScanMatch | Loop) and number not in dropped
+        }
+        trusted = tuple(link for link in links.values() if not isinstance(link, questioned))
+        return cls(gauges[0], trusted, {n: link for n, link in links.items() if isinstance(link, questioned)})
 
     def factors(self, robust: bool) -> gtsam.NonlinearFactorGraph:
         """Gauge, odometry, and then what is in question, in its order; that with Huber's loss where `robust`."""

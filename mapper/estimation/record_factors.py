@@ -27,7 +27,7 @@ from ...factors.depth_centre import depth_centre_factor
 from ...factors.guard import position_guard, size_guard
 from ...factors.odometry import between_factor, gauge_prior
 from ..config import SmootherConfig
-from .ledger import Box, DepthCentre, Gauge, Loop, Motion, NewLandmark, Record, Up, UpPrior, Visual
+from .ledger import Box, DepthCentre, Gauge, Loop, Motion, NewLandmark, Record, ScanMatch, Up, UpPrior, Visual
 from .size_site import SizeSite
 
 UP = U(0)
@@ -63,7 +63,7 @@ def record_factors(record: Record, context: FactorContext) -> list[gtsam.Nonline
         case Motion():
             keys = X(record.a), X(record.b)
             return [between_factor(*keys, record.T_a_b, record.covariance, robust=c.robust_odometry)]
-        case Visual() | Loop():
+        case Visual() | ScanMatch() | Loop():
             keys = X(record.a), X(record.b)
             return [between_factor(*keys, record.T_a_b, record.covariance, robust=True)]
         case UpPrior():

@@ -24,6 +24,7 @@ from .ledger import (
     NewLandmark,
     Record,
     Retire,
+    ScanMatch,
     Site,
     UpPrior,
     Visual,
@@ -59,10 +60,15 @@ class Smoother(LedgerGraph):
         self.add(Gauge(T_world_camera, sigmas))
         self.add(UpPrior(up, up_sigma))
 
-    def add_keyframe(self, T_a_b: np.ndarray, covariance: np.ndarray) -> int:
-        """Next keyframe by odometry from the last one, (4, 4) and (6, 6); returns its number."""
+    def add_keyframe(self, T_a_b: np.ndarray, covariance: np.ndarray, T_world_camera: np.ndarray | None = None) -> int:
+        """Next keyframe by odometry from the last one, (4, 4) and (6, 6); returns its number.
+
+        `T_world_camera` (4, 4) is where it is best started, where more than odometry is known.
+        """
         t = self.keyframes
         self.add(Motion(t - 1, t, T_a_b, covariance))
+        if T_world_camera is not None:
+            self._graph.values.update(X(t), pose3(T_world_camera))
         return t
 
     def add_landmark(self, landmark: int, position: np.ndarray, log_size: np.ndarray, site: SizeSite) -> None:
@@ -108,7 +114,7 @@ class Smoother(LedgerGraph):
         self.ledger.append(Retire(landmark))
 
     def drop_loops(self, numbers: Iterable[int]) -> None:
-        """Takes loop closures (or visual motions) that were found wrong out of the graph.
+        """Takes loop closures (or other motions beside odometry) that were found wrong out of the graph.
 
         Args:
             numbers: as `add` returned them; what has been dropped already is left at that.
@@ -118,7 +124,7 @@ class Smoother(LedgerGraph):
         """
         numbers = sorted(set(numbers))
         for number in numbers:
-            if not isinstance(self.ledger[number], Loop | Visual):
+            if not isinstance(self.ledger[number], Loop | ScanMatch | Visual):
                 raise ValueError(f"record {number} is a {type(self.ledger[number]).__name__}, which cannot be dropped")
         for number in numbers:
             if not self._live.is_dropped(number):

@@ -18,12 +18,14 @@ class View:
         keyframe: its number in the graph.
         T_world_camera: (4, 4) predicted pose.
         R_world_upright: (3, 3) frame of the object volumes.
+        placed: whether it is known where the camera is; otherwise nothing that it sees can be told from what is known.
     """
 
     frame: Frame
     keyframe: int
     T_world_camera: np.ndarray
     R_world_upright: np.ndarray
+    placed: bool = True
 
     def to_world(self, points: np.ndarray) -> np.ndarray:
         """(3,) or (N, 3) camera-frame points to world, metres."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from typing import Any
+
 import numpy as np
 
 from ...datasets.frame import BrokenFrame, Frame, FrameProblem
@@ -11,8 +14,13 @@ from ..estimation.smoother import Smoother
 from ..estimation.view import View
 from ..map.object_map import MapFrame, UpDirection
 from ..map.upright import upright_rotation
-from .features import FeatureExtractor
+from .depth_points import DepthPoints
+from .features import FeatureExtractor, Features
 from .keyframes import FrameTrajectory, KeyframeSelector
+from .hybrid_links import HybridLinks
+from .known_place import KnownPlace
+from .loops import LoopCloser
+from .odometry import OdometryStep, Tracking, TrackingOutcome, fused, widened
 from .odometry_sources import make_odometry
 from .up import UpMeasurement, camera_prior, from_accelerometer, from_planes, scanner_prior
 from .visual import VisualOdometry
@@ -35,12 +43,19 @@ class CameraGraph:
         self._gravity = gravity if given else None
         self.map_frame = MapFrame.DATASET if given else MapFrame.FIRST_CAMERA
         self._odometry = make_odometry(config.odometry)
+        self._extract = FeatureExtractor(config.visual)
         self._visual = VisualOdometry(config.visual, config.seed) if config.visual.enabled and not given else None
-        self._features = FeatureExtractor(config.visual)
+        self._points = DepthPoints(config.odometry.pixel_step, config.odometry.min_range, config.odometry.max_range)
         self._selector = KeyframeSelector(config.keyframes)
         self._frames = FrameTrajectory()
-        self._T_odometry_camera = np.eye(4)
+        self._place = KnownPlace(config.loops)
+        self._loops: LoopCloser | None = None
+        self._hybrid: HybridLinks | None = None
+        self._T_last_now: np.ndarray | None = None  # between the last two keyframes, as measured
+        self._unmatched: tuple[int, Features, np.ndarray] | None = None  # the latest keyframe, until it is solved
+        self._tracking = Tracking(np.eye(4), TrackingOutcome.GOOD)
         self._T_keyframe_camera = np.eye(4)
+        self.tracked: Counter[TrackingOutcome] = Counter()  # frames by outcome
         self._up_sources: set[str] = set()
         self._smoother: Smoother | None = None
 
@@ -70,27 +85,73 @@ class CameraGraph:
             raise BrokenFrame(frame.name, FrameProblem.OTHER_CAMERA)
         if not self.started:
             self._odometry = make_odometry(self._config.odometry, frame.scan is not None)
-        self._T_odometry_camera = self._odometry.register(frame).T_odometry_camera
-        if self._selector.is_keyframe(self._T_odometry_camera) or not self.started:
+        self._tracking = self._odometry.register(frame)
+        self.tracked[self._tracking.outcome] += 1
+        T = self._tracking.T_odometry_camera
+        if self._selector.is_keyframe(T, self._tracking.outcome) or not self.started:
             return True
-        last = self.smoother.keyframes - 1
-        self._T_keyframe_camera = self._frames.append(frame.stamp, self._T_odometry_camera, last, False)
+        self._T_keyframe_camera = self._frames.append(frame.stamp, T, self.smoother.keyframes - 1, False)
         return False
 
     def add_keyframe(self, frame: Frame) -> View:
-        """Puts the tracked frame into the graph with its odometry and what it says about up."""
+        """Puts the tracked frame into the graph: odometry, motion by features, links that are due, and up.
+
+        To be followed by `smoother.update()`, and then by `match_keyframe`.
+        """
+        for links in (self._loops, self._hybrid):
+            if links is not None:
+                links.collect(self.smoother.keyframes)
         step = self._odometry.keyframe()
+        features = self._extract(frame) if frame.has_image and frame.scan is None else None
         if step is None:
             T_world_camera, number = self._start(frame), 0
         else:
-            T_world_camera = self.smoother.pose(self.smoother.keyframes - 1) @ step.T_a_b
-            number = self.smoother.add_keyframe(step.T_a_b, step.covariance)
-        self._T_keyframe_camera = self._frames.append(frame.stamp, self._T_odometry_camera, number, True)
-        if self._visual is not None:
-            for edge in self._visual.add_keyframe(number, self._features(frame)):
-                self.smoother.add(Visual(edge.a, edge.b, edge.motion.T_a_b, edge.motion.covariance))
+            T_world_camera, number = self._go_on(step, features)
+        if self._hybrid is not None:
+            degenerate = self._tracking.outcome is TrackingOutcome.DEGENERATE
+            self._hybrid.add_keyframe(number, frame, self._T_last_now, degenerate)
+        if self._visual is not None and features is not None:
+            self._visual.remember(number, features)
+        self._T_keyframe_camera = self._frames.append(
+            frame.stamp, self._tracking.T_odometry_camera, number, is_keyframe=True
+        )
         self._measure_up(frame, number, T_world_camera)
-        return View(frame, number, T_world_camera, self.smoother.R_world_upright)
+        if self._loops is not None and features is not None:
+            self._unmatched = number, features, self._points(frame)
+        return View(frame, number, T_world_camera, self.smoother.R_world_upright, self._place.is_known)
+
+    def match_keyframe(self) -> None:
+        """Has the latest keyframe, now solved, matched with others; what comes of it enters the graph later."""
+        if self._unmatched is not None and self._loops is not None:
+            number, features, points = self._unmatched
+            self._loops.add_keyframe(number, features, points, adrift=not self._place.is_known)
+            self._unmatched = None
+
+    def finish(self) -> None:
+        """Puts all links that are still being looked for into the graph."""
+        if self._loops is not None:
+            self._loops.finish(self.smoother.keyframes - 1)
+        if self._hybrid is not None:
+            self._hybrid.finish()
+
+    def _go_on(self, step: OdometryStep, features: Features | None) -> tuple[np.ndarray, int]:
+        """The next keyframe, from the last one by odometry and by features; its (4, 4) pose and its number."""
+        last = self.smoother.keyframes - 1
+        edges = self._visual.edges(features) if self._visual is not None and features is not None else []
+        seen = [edge.motion for edge in edges if edge.a == last]
+        motion, covariance = step.T_a_b, step.covariance
+        step_covariance = step.covariance
+        if seen:
+            # a local model that was bent where geometry is weak snaps back when it meets a corner
+            other = seen[0].T_a_b, seen[0].covariance
+            step_covariance = widened(step.T_a_b, step.covariance, *other, self._config.visual.gate)
+            motion, covariance = fused(step.T_a_b, step_covariance, *other)
+        self._T_last_now, T_world_camera = motion, self.smoother.pose(last) @ motion
+        self._place.step(last + 1, covariance)
+        number = self.smoother.add_keyframe(step.T_a_b, step_covariance, T_world_camera)
+        for edge in edges:
+            self.smoother.add(Visual(edge.a, number, edge.motion.T_a_b, edge.motion.covariance))
+        return T_world_camera, number
 
     def pose(self) -> np.ndarray:
         """(4, 4) `T_world_camera` of the last frame, as estimated now."""
@@ -107,6 +168,24 @@ class CameraGraph:
         self.smoother.settle()
         return self._frames.keyframe_stamps(), self.smoother.poses(), self.smoother.pose_covariances()
 
+    def statistics(self) -> dict[str, Any]:
+        """Frames by tracking outcome, times the place was lost and found, links by kind; JSON-able."""
+        tracking = {outcome.value: self.tracked[outcome] for outcome in TrackingOutcome}
+        place = self._place
+        return {
+            "tracking": tracking,
+            "place": {"lost": place.lost, "found": place.found, "given_up": place.given_up},
+            "links": self._link_statistics(),
+        }
+
+    def _link_statistics(self) -> dict[str, Any]:
+        statistics: dict[str, Any] = dict(self._loops.statistics()) if self._loops is not None else {}
+        if self._hybrid is not None:
+            statistics |= dict(sorted(self._hybrid.outcomes.items()))
+            if self._hybrid.unavailable:
+                statistics["whole image, why unavailable"] = self._hybrid.unavailable
+        return statistics
+
     def up(self) -> UpDirection:
         """The world's up direction with its uncertainty and the best source that spoke of it (`UP_SOURCES`)."""
         if not self.started:
@@ -120,7 +199,7 @@ class CameraGraph:
         up = from_accelerometer(frame, config) or scanner_prior(frame, config) or camera_prior(config)
         T = np.eye(4)
         if self.map_frame is MapFrame.DATASET:
-            T = self._T_odometry_camera
+            T = self._tracking.T_odometry_camera
         elif up.source == "accelerometer":
             T[:3, :3] = upright_rotation(up.direction).T
             self.map_frame = MapFrame.GRAVITY_ALIGNED
@@ -131,6 +210,11 @@ class CameraGraph:
         self.intrinsics = frame.intrinsics
         self._smoother = Smoother(self._config.smoother, frame.intrinsics, self._config.up.upright_tolerance)
         self._smoother.add_first(T, GAUGE_SIGMAS, direction, sigma)
+        if self._config.loops.enabled and self._config.odometry.source is not OdometrySource.POSES:
+            self._loops = LoopCloser(self._config, self._smoother)
+            if self._config.hybrid.enabled and frame.has_image and frame.scan is None:
+                self._hybrid = HybridLinks(self._config, self._smoother)
+            self._place.follow(self._smoother)
         return T
 
     def _measure_up(self, frame: Frame, keyframe: int, T_world_camera: np.ndarray) -> None:

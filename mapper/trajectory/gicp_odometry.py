@@ -51,6 +51,9 @@ class GicpOdometry:
         self._motion = np.eye(4)  # of the last frame, the next one's guess
         self._source = np.empty((0, 3))  # points of the last frame, camera
         self._reference: np.ndarray | None = None  # points of the last keyframe, odometry's world
+        self._open = np.zeros((6, 6))  # covariance of the last frame's pose along what its planes leave open
+        self._open_at_keyframe = np.zeros((6, 6))
+        self._T_keyframe = np.eye(4)
         self._lost_in_a_row = 0
         self._lost_since_keyframe = False
 
@@ -60,6 +63,7 @@ class GicpOdometry:
         cloud = self._model.prepare(points)
         self._source = cloud.points()[:, :3].copy()
         T, outcome = self._T, TrackingOutcome.GOOD
+        self._open = np.zeros((6, 6))
         if not self._model.empty:
             T, outcome = self._align(frame, points, cloud, guess)
         self._T, self._motion = T, inverse(self._T) @ T
@@ -75,10 +79,14 @@ class GicpOdometry:
         covariance = np.zeros((6, 6))
         if self._reference is not None:
             covariance = self._covariance(point_to_plane_covariance(self._source, self._T, self._reference))
+            # a frame that the model holds again tells of the drift until then: the step takes it back
+            moved = gtsam.Pose3(nearest_rigid(inverse(self._T) @ self._T_keyframe)).AdjointMap()
+            covariance = covariance + moved @ self._open_at_keyframe @ moved.T
         if self._lost_since_keyframe:
             covariance = covariance + np.diag(np.repeat(np.square(self._config.gicp.lost_sigma), 3))
         lost = self._lost_in_a_row > 0
         self._lost_since_keyframe = lost  # the step away from a guessed pose is not known either
+        self._T_keyframe, self._open_at_keyframe = self._T, self._open
         if not lost:
             self._reference = self._placed()
         return self._keyframes.step(self._T, covariance)
@@ -122,6 +130,7 @@ class GicpOdometry:
                 return fit.T, TrackingOutcome.GOOD
             if weak is None or start.sigma == c.image_sigma:
                 weak = _weigh(fit.T, planes, start)
+                self._open[3:, 3:] = self._open_covariance(planes)
             if start.sigma == c.image_sigma:
                 break
         if weak is not None:
@@ -139,12 +148,16 @@ class GicpOdometry:
 
     def _covariance(self, planes: PlaneInformation) -> np.ndarray:
         """(6, 6) of a step: two scans were matched to the same model, and said nothing along an open direction."""
-        g = self._config.gicp
-        covariance = g.inflation * planes.covariance()
-        eigenvalues, directions = np.linalg.eigh(planes.information[3:, 3:])
-        weak = directions[:, eigenvalues <= g.degenerate_ratio * eigenvalues[-1]]
-        covariance[3:, 3:] += g.open_sigma**2 * weak @ weak.T
+        covariance = self._config.gicp.inflation * planes.covariance()
+        covariance[3:, 3:] += self._open_covariance(planes)
         return covariance
+
+    def _open_covariance(self, planes: PlaneInformation) -> np.ndarray:
+        """(3, 3) m^2 of a translation along what planes leave open."""
+        c = self._config.gicp
+        strength, directions = np.linalg.eigh(planes.information[3:, 3:])
+        weak = directions[:, strength <= c.degenerate_ratio * strength[-1]]
+        return c.open_sigma**2 * weak @ weak.T
 
     def _lose(self, cloud: small_gicp.PointCloud, points: np.ndarray) -> None:
         self._lost_since_keyframe = True

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
+import gtsam
 import numpy as np
 
 from ...datasets.frame import Frame
 from ..config import OdometryConfig
-from .rigid import inverse, rotation_angle
+from .rigid import inverse, nearest_rigid, rotation_angle
 
 
 class TrackingOutcome(Enum):
@@ -40,6 +41,34 @@ class OdometryStep:
 
     T_a_b: np.ndarray
     covariance: np.ndarray
+
+
+def fused(
+    T: np.ndarray, covariance: np.ndarray, T_other: np.ndarray, covariance_other: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The mean of two measurements of one motion, (4, 4) with (6, 6) in their right tangents, and its covariance.
+
+    With informations Lambda and W: d = Log(T^-1 T_other), T Exp((Lambda + W)^-1 W d).
+    """
+    information, other = np.linalg.inv(covariance), np.linalg.inv(covariance_other)
+    together = np.linalg.inv(information + other)
+    d = gtsam.Pose3.Logmap(gtsam.Pose3(nearest_rigid(T)).between(gtsam.Pose3(nearest_rigid(T_other))))
+    return nearest_rigid(T @ gtsam.Pose3.Expmap(together @ other @ d).matrix()), together
+
+
+def widened(
+    T: np.ndarray, covariance: np.ndarray, T_other: np.ndarray, covariance_other: np.ndarray, gate: float
+) -> np.ndarray:
+    """(6, 6) of a measurement that contradicts another one of the same motion, so wide that it no longer does.
+
+    Args:
+        T, covariance: (4, 4), (6, 6) in its right tangent; the one in doubt.
+        T_other, covariance_other: the one that is relied on.
+        gate: chi-square of 6 degrees of freedom, up to which the two agree and nothing is changed.
+    """
+    d = gtsam.Pose3.Logmap(gtsam.Pose3(nearest_rigid(T)).between(gtsam.Pose3(nearest_rigid(T_other))))
+    squared = float(d @ np.linalg.solve(covariance + covariance_other, d))
+    return covariance if squared <= gate else covariance * squared / len(d)
 
 
 class Odometry(Protocol):

@@ -16,26 +16,28 @@ from .features import Features
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VisualEdge:
-    """Measured motion between the keyframes numbered `a` and `b`."""
+    """Measured motion from the keyframe numbered `a` to a frame: `motion.T_a_b`."""
 
     a: int
-    b: int
     motion: RelativePose
 
 
 class VisualOdometry:
-    """Remembers the features of the last keyframes; measures each new one against them."""
+    """Remembers the features of the last keyframes; measures the next one against them."""
 
     def __init__(self, config: VisualConfig, seed: int) -> None:
         self._config, self._seed = config, seed
         self._recent: deque[tuple[int, Features]] = deque(maxlen=config.neighbours)
 
-    def add_keyframe(self, keyframe: int, features: Features) -> list[VisualEdge]:
-        """Edges from the last keyframes to this one; fewer, or none, where too little matches."""
+    def edges(self, features: Features) -> list[VisualEdge]:
+        """Motions from the last keyframes to a frame; fewer, or none, where too little matches."""
         edges = []
         for number, old in self._recent:
             motion = relative_pose(old, features, self._config, self._seed)
             if motion is not None:
-                edges.append(VisualEdge(number, keyframe, motion))
-        self._recent.append((keyframe, features))
+                edges.append(VisualEdge(number, motion))
         return edges
+
+    def remember(self, keyframe: int, features: Features) -> None:
+        """The next frames are measured against this one."""
+        self._recent.append((keyframe, features))
