@@ -1,4 +1,4 @@
-"""Trains the words that places are recognised by, on the synthetic world: mapper/trajectory/orb_words.npz.
+"""Trains the words that places are recognised by, on the synthetic world: mapper/trajectory/loops/orb_words.npz.
 
 uv run python benchmarks/place_vocabulary.py --write           some ten minutes, 700 MB of scenes
 uv run python benchmarks/place_vocabulary.py -o FILE.npz       the same, somewhere else
@@ -23,8 +23,8 @@ from thingmap.datasets.synthetic.config import ClutterLevel, Preset, SyntheticCo
 from thingmap.datasets.synthetic.files.writing import write_sequence
 from thingmap.datasets.synthetic.sequence import SyntheticSequence
 from thingmap.mapper.config import VisualConfig
-from thingmap.mapper.trajectory.features import FeatureExtractor
-from thingmap.mapper.trajectory.vocabulary import SHIPPED, packed, train_vocabulary
+from thingmap.mapper.trajectory.loops.vocabulary import SHIPPED, packed, train_vocabulary
+from thingmap.mapper.trajectory.visual.features import FeatureExtractor
 
 SEEDS = range(2, 21)  # of each level of clutter
 FRAMES = 37

@@ -21,9 +21,9 @@ from thingmap.datasets.errors import UserError
 from thingmap.datasets.frame import Frame
 from thingmap.datasets.open import open_sequence
 from thingmap.mapper.config import PlaceConfig, VisualConfig
-from thingmap.mapper.trajectory.features import FeatureExtractor, Features
-from thingmap.mapper.trajectory.place_index import PlaceIndex
-from thingmap.mapper.trajectory.vocabulary import Vocabulary, packed
+from thingmap.mapper.trajectory.loops.place_index import PlaceIndex
+from thingmap.mapper.trajectory.loops.vocabulary import Vocabulary, packed
+from thingmap.mapper.trajectory.visual.features import FeatureExtractor, Features
 
 TITLE = "Places"
 LAPS = "synth:laps?seed=1&frames=1800"

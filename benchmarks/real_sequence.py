@@ -27,7 +27,7 @@ from thingmap.mapper.config import MapperConfig, OdometryConfig
 from thingmap.mapper.config_file import load_config
 from thingmap.mapper.mapper import SemanticMapper
 from thingmap.mapper.runner import run_sequence
-from thingmap.mapper.trajectory.kiss_odometry import KissOdometry
+from thingmap.mapper.trajectory.odometry.kiss_odometry import KissOdometry
 
 KNOWN_OBJECTS = "objects_derived.json"
 

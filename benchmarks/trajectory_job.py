@@ -32,7 +32,7 @@ from thingmap.mapper.config import MapperConfig
 from thingmap.mapper.estimation.ledger import Ledger
 from thingmap.mapper.mapper import SemanticMapper
 from thingmap.mapper.runner import run_sequence
-from thingmap.mapper.trajectory.odometry_sources import make_odometry
+from thingmap.mapper.trajectory.odometry.sources import make_odometry
 
 
 def scene_folder(config: SyntheticConfig, folder: Path) -> Path:

@@ -6,17 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from . import (
-    folder,
-    kitti,
-    kitti_raw,
-    pcd_folder,
-    rgbd_scenes_v1,
-    rgbd_scenes_v2,
-    seven_scenes,
-    tum,
-    tum_keyframes,
-)
+from . import folder, kitti, kitti_raw, pcd_folder, rgbd_scenes_v1, rgbd_scenes_v2, seven_scenes, tum, tum_keyframes
 from .errors import InputError, UserError
 from .paths import user_path
 from .sequence import Sequence

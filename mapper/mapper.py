@@ -37,6 +37,7 @@ from .map.object_map import PROBABLE, ObjectMap
 from .stages import StageClock
 from .trajectory.camera import CameraGraph
 from .trajectory.cloud import KeyframeCloud
+from .trajectory.constellation.recognition import same_places
 
 GENERIC = "generic"  # name of the evidence model that was learned from nothing
 
@@ -116,6 +117,7 @@ class SemanticMapper:
             self._map(view, self._lift(found, frame))
             with self._clock.stage("links"):
                 self._camera.match_keyframe()
+                self._recognise_things(view.keyframe)
             with self._clock.stage("cloud"):
                 self._cloud.add(frame, view.keyframe, self._camera.smoother.pose(view.keyframe))
         return MapUpdate(frame.index, is_keyframe, self._camera.pose(), self._count_things())
@@ -124,7 +126,7 @@ class SemanticMapper:
         """One keyframe: visibility -> association -> factors -> smoothing -> class and existence -> lifecycle."""
         stage = self._clock.stage
         assert self._lifecycle is not None and self._observer is not None
-        lifecycle, observer, smoother = self._lifecycle, self._observer, self._camera.smoother
+        lifecycle, observer = self._lifecycle, self._observer
         if not view.placed:
             self._outcomes[Outcome.ADRIFT] += len(lifted)
             return self._solve()
@@ -140,6 +142,13 @@ class SemanticMapper:
             if promoted or view.keyframe % self.config.lifecycle.merge_every == 0:
                 lifecycle.merge()
             lifecycle.retire()
+
+    def _recognise_things(self, keyframe: int) -> None:
+        """From time to time: whether the things mapped lately lie as some did that were mapped long ago."""
+        loops = self.config.loops
+        if loops.constellation and keyframe % loops.constellation_every == 0 and self._camera.seeks_loops:
+            landmarks, smoother = self._scene.landmarks.values(), self._camera.smoother
+            self._camera.propose_loops(same_places(landmarks, keyframe, smoother, self.config.constellation))
 
     def _solve(self) -> None:
         """The graph with all that is new; what is not in it follows where poses were corrected."""

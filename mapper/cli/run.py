@@ -124,7 +124,7 @@ def _check_odometry(odometry: OdometryConfig, frames: Sequence, sequence: str) -
     """That the poses it takes from elsewhere are there, before a folder is made."""
     from ...datasets.errors import UserError
     from ..config import OdometrySource
-    from ..trajectory.given_odometry import check_trajectory
+    from ..trajectory.odometry.given_odometry import check_trajectory
 
     if odometry.source is OdometrySource.POSES and frames.poses is None:
         raise UserError(f"{sequence}: the sequence has no poses; use --odometry {OdometrySource.KISS_ICP.value}")
@@ -136,7 +136,7 @@ def _settings(config: Path | None, seed: int | None, odometry: str | None, base:
     """The configuration file over the defaults of this kind of sequence, with the command line over it."""
     from ..config import MapperConfig
     from ..config_file import load_config
-    from ..trajectory.odometry_sources import with_source
+    from ..trajectory.odometry.sources import with_source
 
     settings = load_config(config, MapperConfig, base)
     if seed is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -14,16 +15,17 @@ from ..estimation.smoother import Smoother
 from ..estimation.view import View
 from ..map.object_map import MapFrame, UpDirection
 from ..map.upright import upright_rotation
+from .constellation.candidates import LoopCandidate
 from .depth_points import DepthPoints
-from .features import FeatureExtractor, Features
 from .keyframes import FrameTrajectory, KeyframeSelector
-from .hybrid_links import HybridLinks
 from .known_place import KnownPlace
-from .loops import LoopCloser
-from .odometry import OdometryStep, Tracking, TrackingOutcome, fused, widened
-from .odometry_sources import make_odometry
+from .loops.loop_closer import LoopCloser
+from .odometry.odometry import OdometryStep, Tracking, TrackingOutcome, fused, widened
+from .odometry.sources import make_odometry
 from .up import UpMeasurement, camera_prior, from_accelerometer, from_planes, scanner_prior
-from .visual import VisualOdometry
+from .visual.features import FeatureExtractor, Features
+from .visual.hybrid_links import HybridLinks
+from .visual.visual_odometry import VisualOdometry
 
 UP_SOURCES = ("gravity file", "accelerometer", "planes", "LiDAR axis", "camera prior")  # the best first
 GAUGE_SIGMAS = np.repeat([1e-3, 1e-3], 3)  # rad, m: the first camera defines the world
@@ -126,6 +128,16 @@ class CameraGraph:
             number, features, points = self._unmatched
             self._loops.add_keyframe(number, features, points, adrift=not self._place.is_known)
             self._unmatched = None
+
+    @property
+    def seeks_loops(self) -> bool:
+        """Whether the camera has not been tied to a place of long ago lately."""
+        return self._loops is not None and not self._loops.has_old_links(self.smoother.keyframes - 1)
+
+    def propose_loops(self, candidates: Iterable[LoopCandidate]) -> None:
+        """Has keyframes matched that saw the same things."""
+        if self._loops is not None:
+            self._loops.propose(self.smoother.keyframes - 1, candidates)
 
     def finish(self) -> None:
         """Puts all links that are still being looked for into the graph."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..config import KeyframeConfig
-from .odometry import TrackingOutcome
+from .odometry.odometry import TrackingOutcome
 from .rigid import inverse, rotation_angle
 from .twist import exp, inverses, log
 

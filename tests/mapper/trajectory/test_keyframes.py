@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from thingmap.mapper.config import KeyframeConfig
 from thingmap.mapper.trajectory.keyframes import FrameTrajectory, KeyframeSelector
-from thingmap.mapper.trajectory.odometry import TrackingOutcome
+from thingmap.mapper.trajectory.odometry.odometry import TrackingOutcome
 from thingmap.mapper.trajectory.rigid import inverse
 
 CONFIG = KeyframeConfig(translation=0.1, rotation=0.2, max_gap=5)

@@ -1,0 +1,1 @@
+"""Places recognised by the things in them."""

@@ -1,0 +1,1 @@
+"""Links between keyframes that are not neighbours."""

@@ -1,0 +1,198 @@
+"""Links between keyframes that are not neighbours: local ones by depth, loop closures by image, depth and things.
+
+A keyframe is matched by depth with the nearest places of three ages, as far as it is known how they lie: that holds a
+trajectory far better than its steps alone. Where that is not known, after drift or after being lost, places that look
+alike are verified by features, then by depth; or places whose things lie alike. What passes enters the graph a fixed
+number of keyframes later (so that a run does not depend on how fast the other process is), with Huber's loss; from
+time to time all loop closures are checked together by GNC (`estimation.pose_graph`), and the wrong ones leave.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import replace
+from itertools import count
+
+import gtsam
+import numpy as np
+
+from ...config import MapperConfig
+from ...deferred import Deferred
+from ...estimation.ledger import Loop, ScanMatch
+from ...estimation.pose_graph import LoopCheck, PoseGraph, check_loops
+from ...estimation.smoother import Smoother
+from ..constellation.candidates import LoopCandidate
+from ..rigid import inverse
+from ..visual.features import Features
+from .link_jobs import Candidate, LinkConfig, LinkFound, LinkJob, LinkKind, find_links
+from .places import Place, Places
+from .scan_matching import Scan
+
+_owners = count()
+
+
+class LoopCloser:
+    """Proposes links, has them verified, and puts them into the smoother.
+
+    Args:
+        config: of the whole mapper.
+        smoother: whose keyframes are linked.
+    """
+
+    def __init__(self, config: MapperConfig, smoother: Smoother) -> None:
+        self._config, self._smoother = config.loops, smoother
+        self._spacing = config.scans.spacing
+        self._places = Places(config.loops, config.places)
+        features = replace(config.visual, min_inliers=config.loops.min_inliers)
+        self._link = LinkConfig(config.scans, features, config.loops.agreement, config.seed)
+        self._owner = next(_owners)
+        self._jobs = Deferred(find_links, config.loops.lag, config.loops.process)
+        self._checks = Deferred(check, config.loops.check_lag, config.loops.process)
+        self._unchecked = 0  # loops since the last check
+        self._last_linked = -(10**9)  # keyframe that was last tied to a place older than all of `ages`
+        self.outcomes: Counter[str] = Counter()
+
+    def add_keyframe(self, keyframe: int, features: Features, points: np.ndarray, adrift: bool = False) -> None:
+        """Has the latest keyframe matched, once it is solved.
+
+        Args:
+            keyframe: its number.
+            features: of its image.
+            points: (N, 3) of its depth, camera frame, metres.
+            adrift: the camera does not know its place: young places may be the way back too.
+        """
+        place = Place(keyframe, features, Scan.of(points, self._spacing))
+        poses = self._smoother.poses()
+        self._submit(place, (*self._near(keyframe, poses), *self._alike(place, adrift)))
+        self._places.offer(place, poses)
+
+    def propose(self, keyframe: int, candidates: Iterable[LoopCandidate]) -> None:
+        """Has pairs of keyframes matched that saw the same things; the nearest places stand for them."""
+        poses = self._smoother.poses()
+        for candidate in candidates:
+            old, recent = (self._nearest_place(k, poses) for k in (candidate.old, candidate.recent))
+            if old is None or recent is None or old == recent:
+                continue
+            T_old_old, T_recent_recent = (
+                inverse(poses[a]) @ poses[b] for a, b in ((old, candidate.old), (candidate.recent, recent))
+            )
+            guess = T_old_old @ candidate.T_old_recent @ T_recent_recent
+            one = Candidate(self._places[old], LinkKind.SAME_THINGS, guess)
+            self._submit(self._places[recent], (one,), keyframe)
+
+    def collect(self, keyframe: int) -> bool:
+        """Puts what is due by this keyframe into the smoother, to be solved with it; whether a loop was closed."""
+        links = [link for links in self._jobs.due(keyframe) for link in links]
+        verdicts = self._checks.due(keyframe)
+        return self._take(links, verdicts, keyframe)
+
+    def finish(self, keyframe: int) -> bool:
+        """Puts all that is outstanding into the smoother; whether a loop was closed."""
+        links = [link for links in self._jobs.drain() for link in links]
+        return self._take(links, self._checks.drain(), keyframe)
+
+    def has_old_links(self, keyframe: int) -> bool:
+        """Whether the camera was lately tied to a place of long ago: no other way of finding one is needed then."""
+        return self._last_linked >= keyframe - self._config.ages[0] - self._config.lag
+
+    def statistics(self) -> dict[str, int]:
+        """Numbers of places, of links by their kind, and of those refused."""
+        return {"places": len(self._places), **dict(sorted(self.outcomes.items()))}
+
+    # -- candidates
+
+    def _near(self, keyframe: int, poses: np.ndarray) -> list[Candidate]:
+        """The nearest place of each age, where the views overlap and it is known well enough how they lie."""
+        c, numbers = self._config, self._places.keyframes
+        if not len(numbers):
+            return []
+        turned, moved = self._places.distances(poses, keyframe)
+        apart = np.hypot(turned / c.reach[0], moved / c.reach[1])
+        known = self._is_known(self._smoother.path_covariances(keyframe)[numbers])
+        usable = (apart < 1.0) & known & (numbers <= keyframe - c.skip)
+        age, candidates = keyframe - numbers, []
+        for youngest, oldest in zip((0, *c.ages), (*c.ages, np.inf), strict=True):
+            of_age = np.flatnonzero(usable & (age > youngest) & (age <= oldest))
+            if len(of_age):
+                best = int(numbers[of_age[np.argmin(apart[of_age])]])
+                guess = inverse(poses[best]) @ poses[keyframe]
+                candidates.append(Candidate(self._places[best], LinkKind.NEAR, guess))
+        return candidates
+
+    def _alike(self, place: Place, adrift: bool) -> list[Candidate]:
+        """Places that look alike, if there is no old place of which it is known how it lies."""
+        c = self._config
+        youngest = place.keyframe - (c.skip if adrift else c.min_age)
+        if youngest < 0 or self.has_old_links(place.keyframe):
+            return []
+        found = self._places.alike(place.features, c.candidates, youngest)
+        return [Candidate(one, LinkKind.ALIKE, None) for one in found]
+
+    def _is_known(self, covariances: np.ndarray) -> np.ndarray:
+        """(P,) bool, of (P, 6, 6) covariances of relative poses."""
+        variances = np.diagonal(covariances, axis1=1, axis2=2)
+        turn, move = variances[:, :3].max(axis=1), variances[:, 3:].max(axis=1)
+        return (turn < self._config.known[0] ** 2) & (move < self._config.known[1] ** 2)
+
+    def _nearest_place(self, keyframe: int, poses: np.ndarray) -> int | None:
+        numbers, c = self._places.keyframes, self._config
+        if not len(numbers):
+            return None
+        turned, moved = self._places.distances(poses, keyframe)
+        distance = np.hypot(turned / c.reach[0], moved / c.reach[1]) + 0.01 * np.abs(numbers - keyframe)
+        return int(numbers[np.argmin(distance)])
+
+    def _submit(self, place: Place, candidates: tuple[Candidate, ...], keyframe: int | None = None) -> None:
+        if candidates:
+            turn = place.keyframe if keyframe is None else keyframe
+            self._jobs.submit(turn, LinkJob(self._owner, place, candidates, self._link))
+
+    # -- verdicts
+
+    def _take(self, links: list[LinkFound], verdicts: list[LoopCheck], keyframe: int) -> bool:
+        closed = False
+        poses = self._smoother.poses() if links else np.empty((0, 4, 4))
+        known: dict[int, np.ndarray] = {}
+        for link in links:
+            if link.b not in known:
+                known[link.b] = self._smoother.path_covariances(link.b)
+            closed |= self._add(link, poses, known[link.b][link.a])
+        for verdict in verdicts:
+            wrong = verdict.outliers & self._smoother.loops().keys()
+            self.outcomes["loops found wrong"] += len(wrong)
+            self._smoother.drop_loops(wrong)
+        if self._unchecked and keyframe % self._config.check_every == 0:
+            self._unchecked = 0
+            self._smoother.settle()
+            graph = PoseGraph.of(self._smoother.ledger)
+            self._checks.submit(keyframe, (graph, self._smoother.poses(), self._config.probability))
+        return closed
+
+    def _add(self, link: LinkFound, poses: np.ndarray, known: np.ndarray) -> bool:
+        """A link that agrees with the estimate, known to (6, 6), enters the graph; whether it closes a loop."""
+        if not self._agrees(link, poses, known):
+            self.outcomes[f"{link.kind.value}, refused"] += 1
+            return False
+        self.outcomes[link.kind.value] += 1
+        if link.b - link.a > self._config.ages[-1]:
+            self._last_linked = max(self._last_linked, link.b)
+        motion = link.a, link.b, link.motion.T_a_b, link.motion.covariance
+        if link.kind is LinkKind.NEAR:
+            self._smoother.add(ScanMatch(*motion))
+            return False
+        self._smoother.add(Loop(*motion))
+        self._unchecked += 1
+        return True
+
+    def _agrees(self, link: LinkFound, poses: np.ndarray, known: np.ndarray) -> bool:
+        """Whether a link lies within the gate around the estimate."""
+        expected = inverse(poses[link.a]) @ poses[link.b]
+        off = gtsam.Pose3.Logmap(gtsam.Pose3(link.motion.T_a_b).between(gtsam.Pose3(expected)))
+        floor = np.diag(np.repeat(np.square(self._config.gate_floor), 3))
+        return bool(off @ np.linalg.solve(known + link.motion.covariance + floor, off) < self._config.gate)
+
+
+def check(job: tuple[PoseGraph, np.ndarray, float]) -> LoopCheck:
+    """`check_loops` of one argument, for another process."""
+    return check_loops(*job)

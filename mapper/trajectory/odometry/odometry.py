@@ -1,0 +1,106 @@
+"""Camera motion from frame to frame, as measurements for the graph: what every odometry offers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+import gtsam
+import numpy as np
+
+from ....datasets.frame import Frame
+from ...config import OdometryConfig
+from ..rigid import inverse, nearest_rigid, rotation_angle
+
+
+class TrackingOutcome(Enum):
+    """How well a frame's pose is held by what it shows."""
+
+    GOOD = "good"
+    DEGENERATE = "degenerate"  # the geometry leaves a direction open: it is taken from the image, else from the motion
+    LOST = "lost"  # nothing fits; the pose is what the motion before would have led to
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracking:
+    """Where a frame was: (4, 4) `T_odometry_camera` in the odometry's own world, and how well that is known."""
+
+    T_odometry_camera: np.ndarray
+    outcome: TrackingOutcome
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OdometryStep:
+    """Motion between two keyframes.
+
+    Attributes:
+        T_a_b: (4, 4) camera b in camera a.
+        covariance: (6, 6) in the right tangent of `T_a_b`, [rotation rad, translation m], GTSAM's order.
+    """
+
+    T_a_b: np.ndarray
+    covariance: np.ndarray
+
+
+def fused(
+    T: np.ndarray, covariance: np.ndarray, T_other: np.ndarray, covariance_other: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The mean of two measurements of one motion, (4, 4) with (6, 6) in their right tangents, and its covariance.
+
+    With informations Lambda and W: d = Log(T^-1 T_other), T Exp((Lambda + W)^-1 W d).
+    """
+    information, other = np.linalg.inv(covariance), np.linalg.inv(covariance_other)
+    together = np.linalg.inv(information + other)
+    d = gtsam.Pose3.Logmap(gtsam.Pose3(nearest_rigid(T)).between(gtsam.Pose3(nearest_rigid(T_other))))
+    return nearest_rigid(T @ gtsam.Pose3.Expmap(together @ other @ d).matrix()), together
+
+
+def widened(
+    T: np.ndarray, covariance: np.ndarray, T_other: np.ndarray, covariance_other: np.ndarray, gate: float
+) -> np.ndarray:
+    """(6, 6) of a measurement that contradicts another one of the same motion, so wide that it no longer does.
+
+    Args:
+        T, covariance: (4, 4), (6, 6) in its right tangent; the one in doubt.
+        T_other, covariance_other: the one that is relied on.
+        gate: chi-square of 6 degrees of freedom, up to which the two agree and nothing is changed.
+    """
+    d = gtsam.Pose3.Logmap(gtsam.Pose3(nearest_rigid(T)).between(gtsam.Pose3(nearest_rigid(T_other))))
+    squared = float(d @ np.linalg.solve(covariance + covariance_other, d))
+    return covariance if squared <= gate else covariance * squared / len(d)
+
+
+class Odometry(Protocol):
+    """Registers every frame; measures the motion between the frames that become keyframes."""
+
+    def register(self, frame: Frame) -> Tracking:
+        """Where this frame was.
+
+        Raises:
+            BrokenFrame: it cannot be used at all; the odometry is as before.
+        """
+        ...
+
+    def keyframe(self) -> OdometryStep | None:
+        """Makes the last registered frame a keyframe: the motion since the one before, or None for the first."""
+        ...
+
+
+class KeyframeSteps:
+    """From poses of keyframes to the motion between them, with a covariance that grows with it."""
+
+    def __init__(self, config: OdometryConfig) -> None:
+        self._config = config
+        self._T_last: np.ndarray | None = None
+
+    def step(self, T: np.ndarray, covariance: np.ndarray) -> OdometryStep | None:
+        """Motion to (4, 4) `T_odometry_camera` with its (6, 6) covariance; None for the first."""
+        previous, self._T_last = self._T_last, T
+        if previous is None:
+            return None
+        T_a_b = inverse(previous) @ T
+        turned, moved = rotation_angle(T_a_b[:3, :3]), float(np.linalg.norm(T_a_b[:3, 3]))
+        (floor_r, floor_t), (drift_r, drift_t) = self._config.covariance_floor, self._config.drift
+        sigmas = np.repeat([np.hypot(floor_r, drift_r * turned), np.hypot(floor_t, drift_t * moved)], 3)
+        return OdometryStep(T_a_b, covariance + np.diag(sigmas**2))

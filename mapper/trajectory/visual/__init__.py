@@ -1,0 +1,1 @@
+"""Motion from images: features, and whole images."""
