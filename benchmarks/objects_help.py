@@ -40,6 +40,7 @@ class Condition:
         scene: what differs from `SyntheticConfig`'s defaults.
         both: what differs from the mapper's defaults with and without objects, by dotted name.
         with_objects, without: what differs between the two.
+        most: seeds at most, where scenes are long.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Condition:
     both: Mapping[str, Any] = field(default_factory=dict)
     with_objects: Mapping[str, Any] = field(default_factory=lambda: OBJECTS)
     without: Mapping[str, Any] = field(default_factory=lambda: NO_OBJECTS)
+    most: int | None = None
 
     def config(self, objects: bool) -> MapperConfig:
         """Of one of the two mappers.
@@ -61,14 +63,17 @@ class Condition:
         """One a seed, of at most `frames` frames."""
         length = min(self.scene["frames"], frames or self.scene["frames"])
         values = {**self.scene, "frames": length, "width": width}
-        return [SyntheticConfig(seed=FIRST_SEED + k, **values) for k in range(seeds)]
+        return [SyntheticConfig(seed=FIRST_SEED + k, **values) for k in range(min(seeds, self.most or seeds))]
 
 
 TABLETOP = {"preset": Preset.TABLETOP, "frames": 150}
+NO_IMAGES = {"visual.enabled": False, "loops.appearance": False, "hybrid.enabled": False}
+NO_LINKS = {"loops.enabled": False}
 LAPS = {"preset": Preset.LAPS, "frames": 1100}  # a lap of about 1000 frames, and the first keyframes once more
 CONDITIONS = (
     Condition("normal", "as it is", TABLETOP),
-    Condition("few-features", "few features: no visual relative poses", TABLETOP, {"visual.enabled": False}),
+    Condition("few-features", "few features: nothing from images", TABLETOP, NO_IMAGES),
+    Condition("steps", "steps alone: no links by depth, nothing from images", TABLETOP, NO_IMAGES | NO_LINKS),
     Condition("few-objects", "few objects: 3 on the table", {**TABLETOP, "objects": 3}),
     Condition(
         "constellation",
@@ -77,6 +82,7 @@ CONDITIONS = (
         {"loops.appearance": False},
         {"loops.constellation": True},
         {"loops.constellation": False},
+        most=6,
     ),
 )
 

@@ -13,6 +13,7 @@ from collections.abc import Sequence as Items
 from pathlib import Path
 
 import numpy as np
+from kiss_alone import KissAlone
 from known_objects import KnownObject, check_things, read_known_objects
 from real_sequence_report import ALIGNMENTS, Track, describe
 from results import machine, write_section
@@ -27,7 +28,6 @@ from thingmap.mapper.config import MapperConfig, OdometryConfig
 from thingmap.mapper.config_file import load_config
 from thingmap.mapper.mapper import SemanticMapper
 from thingmap.mapper.runner import run_sequence
-from thingmap.mapper.trajectory.odometry.kiss_odometry import KissOdometry
 
 KNOWN_OBJECTS = "objects_derived.json"
 
@@ -74,11 +74,11 @@ def beside_truth(trajectory: tuple[np.ndarray, np.ndarray], sequence: Sequence) 
 
 
 def register_all(sequence: Sequence, config: OdometryConfig) -> tuple[np.ndarray, np.ndarray]:
-    """Stamps and poses of KISS-ICP alone, with the mapper's preset."""
-    odometry, stamps, poses = KissOdometry(config), [], []
+    """Stamps and poses of KISS-ICP alone."""
+    odometry, stamps, poses = KissAlone(config), [], []
     for frame in usable_frames(sequence, lambda broken: None):
         try:
-            poses.append(odometry.register(frame).T_odometry_camera)
+            poses.append(odometry.register(frame))
             stamps.append(frame.stamp)
         except BrokenFrame:
             continue

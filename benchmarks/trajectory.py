@@ -62,12 +62,13 @@ RENDERED = (
 
 @dataclass(frozen=True, slots=True)
 class MapperColumn:
-    """A mapper: what its configuration changes; `alone` for its odometry by itself."""
+    """A mapper: what its configuration changes; `alone` for its odometry by itself, `kiss` for KISS-ICP's own."""
 
     name: str
     title: str
     changes: Mapping[str, Any] = field(default_factory=dict)
     alone: bool = False
+    kiss: bool = False
 
 
 COLUMNS = (
@@ -75,7 +76,8 @@ COLUMNS = (
     MapperColumn("no-objects", "without objects", {"smoother.joint": False}),
     MapperColumn("no-loops", "without loops", {"loops.enabled": False}),
     MapperColumn("no-visual", "without visual", {"visual.enabled": False}),
-    MapperColumn("kiss-icp", "KISS-ICP alone", {"odometry.source": OdometrySource.KISS_ICP}, alone=True),
+    MapperColumn("odometry", "its odometry alone", alone=True),
+    MapperColumn("kiss-icp", "KISS-ICP alone", alone=True, kiss=True),
     MapperColumn("small-gicp", "small_gicp alone", {"odometry.source": OdometrySource.SMALL_GICP}, alone=True),
     MapperColumn(OWN_POSES, "its own poses", {"odometry.source": OdometrySource.POSES}, alone=True),
 )
@@ -98,7 +100,10 @@ def run(job: Job) -> Measured:
     """Maps the sequence and measures the trajectory."""
     sequence = open_one(job.folder, job.frames)
     config = changed(MapperConfig(), job.column.changes)
-    mapped = track_sequence(sequence, config) if job.column.alone else map_sequence(sequence, job.detector, config)
+    if job.column.alone:
+        mapped = track_sequence(sequence, config, job.column.kiss)
+    else:
+        mapped = map_sequence(sequence, job.detector, config)
     return measure(mapped, sequence, open_surfaces(sequence))
 
 

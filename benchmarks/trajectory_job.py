@@ -16,6 +16,7 @@ from typing import Any
 import cv2
 import numba
 import numpy as np
+from kiss_alone import KissAlone
 from trajectory_measures import Mapped
 
 from thingmap.datasets.errors import UserError
@@ -32,6 +33,7 @@ from thingmap.mapper.config import MapperConfig
 from thingmap.mapper.estimation.ledger import Ledger
 from thingmap.mapper.mapper import SemanticMapper
 from thingmap.mapper.runner import run_sequence
+from thingmap.mapper.trajectory.odometry.odometry import Tracking
 from thingmap.mapper.trajectory.odometry.sources import make_odometry
 
 
@@ -81,18 +83,21 @@ def map_sequence(sequence: Frames, detector: str, config: MapperConfig) -> Mappe
     return Mapped(stamps, poses, mapper.keyframes()[0], ledger, outcomes)
 
 
-def track_sequence(sequence: Frames, config: MapperConfig) -> Mapped:
-    """By the configuration's odometry alone."""
+def track_sequence(sequence: Frames, config: MapperConfig, kiss_alone: bool = False) -> Mapped:
+    """By the configuration's odometry alone, or by KISS-ICP without anything of ours."""
     odometry, stamps, poses, outcomes = None, [], [], Counter()
     for frame in usable_frames(sequence, lambda broken: None):
-        odometry = odometry or make_odometry(config.odometry, frame.scan is not None)
+        if odometry is None:
+            alone = KissAlone(config.odometry) if kiss_alone else None
+            odometry = alone or make_odometry(config.odometry, frame.scan is not None)
         try:
             tracking = odometry.register(frame)
         except BrokenFrame:
             continue
-        outcomes[tracking.outcome.value] += 1
+        if isinstance(tracking, Tracking):
+            outcomes[tracking.outcome.value] += 1
         stamps.append(frame.stamp)
-        poses.append(tracking.T_odometry_camera)
+        poses.append(tracking.T_odometry_camera if isinstance(tracking, Tracking) else tracking)
     return Mapped(np.array(stamps), np.array(poses).reshape(-1, 4, 4), np.empty(0), Ledger(), outcomes)
 
 
