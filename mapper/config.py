@@ -53,9 +53,11 @@ class GicpConfig:
     drift: tuple[float, float] = (0.003, 0.003)  # rad per rad turned, m per m moved
     guess_sigma: tuple[float, float] = (0.02, 0.01)  # rad, m: a hand's 20 rad/s^2 and 10 m/s^2 over 1/30 s
     image_sigma: tuple[float, float] = (0.003, 0.004)  # rad, m: of optical flow over a frame, 0.14 degrees and 2.7 mm
+    far_apart: float = 0.2  # s between frames, from which the image tells better than the motion where to start
     open_sigma: float = 0.1  # m, of a step along what its planes leave open: a hand's 1 m/s^2 over 0.5 s
     lost_frames: int = 15  # lost in a row (0.5 s at 30 Hz), after which a new model begins
-    lost_sigma: tuple[float, float] = (0.5, 0.5)  # rad, m: what a hand may do unseen in that time
+    lost_sigma: tuple[float, float] = (0.5, 0.5)  # rad, m: of a step that nothing measured; with (1, 2), beside links
+    # of half a millimetre, GTSAM called the graph indeterminate
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +120,10 @@ class VisualConfig:
     enabled: bool = True
     features: int = 1000
     fast_threshold: int = 10  # grey levels
+    few_features: int = 600  # below which faint ones are looked for; a kitchen's frames have 670 to 960, before a plain
+    # cabinet in an empty hall 50 to 660: with faint ones 55 of 57 steps of 0.2 m were measured there, else 33
+    faint_features: int = 2000
+    faint_threshold: int = 4  # grey levels
     neighbours: int = 1  # keyframes back that a new one is measured against; wider baselines match worse points
     ratio: float = 0.85  # of Lowe's test
     inlier_distance: float = 0.03  # m at 1 m and nearer, growing with z: three times a Kinect's depth noise at 2 m
@@ -136,6 +142,8 @@ class ScanConfig:
     reaches: tuple[float, ...] = (0.08, 0.04)  # m, partners are looked for within, first and last
     max_iterations: int = 20  # each
     min_share: float = 0.4  # of the smaller scan's points that must have a partner
+    degenerate_ratio: float = 0.02  # of the translation's eigenvalues, as GicpConfig.degenerate_ratio
+    open_sigma: float = 0.2  # m, along what planes leave open: before one side of a cabinet matches slid 0.1-0.4 m
     inflation: float = 0.35  # of the point-to-plane covariance: all points were matched, not its sample
     covariance_floor: tuple[float, float] = (0.0003, 0.0005)  # rad, m
 
@@ -217,6 +225,7 @@ class ConstellationConfig:
 
     recent_keyframes: int = 60  # a recent thing was first seen within these; about a quarter of a lap of two rooms
     old_keyframes: int = 60  # an old thing was not seen within these
+    again_keyframes: int = 10  # an old thing seen within these was seen again: as often as LoopConfig asks
     min_existence: float = 0.7  # only things one is sure of
     min_matches: int = 3  # things; with two any pair of cups lies on any other
     sigma_position: float = 0.02  # m, floor of a centre's noise against its neighbours

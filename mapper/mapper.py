@@ -162,10 +162,13 @@ class SemanticMapper:
 
     def _finish(self) -> None:
         """Everything that is still being worked on enters the map, for its reader; a second time changes nothing."""
-        if self._camera.started and self._followers is not None:
-            self._camera.finish()
-            if self._camera.smoother.is_pending:
-                self._solve()
+        if not self._camera.started:
+            return
+        self._camera.finish()
+        if self._followers is None:
+            self._camera.smoother.settle()
+        elif self._camera.smoother.is_pending:
+            self._solve()
 
     def _associate(
         self, view: View, lifted: list[LiftedDetection]

@@ -88,6 +88,7 @@ class BatchMapper(SemanticMapper):
         """What the views so far show; None while there is no view. Asked twice, the same."""
         if self._inference is None and self._stored:
             self._forget_inference()  # one that failed half way
+            self._finish()
             joint = self._camera.with_objects()
             self._camera_only = self._camera.read_from(joint)
             self._scene, self._outcomes = Scene(), Counter(self._refused)

@@ -8,6 +8,9 @@ and move by themselves. What does not is brought along here:
     retired landmarks   are in no graph: they move with the keyframes that saw them
     what is there twice becomes one (`Lifecycle.reunite`)
 
+Before that, where a loop was closed: a landmark into which two things went while the poses were wrong becomes two
+(`Lifecycle.separate`). Such a landmark may hold the poses against the loop, which then have not even moved.
+
 The cloud has `KeyframeCloud.rebuild`, since nothing here depends on it.
 """
 
@@ -19,7 +22,9 @@ import numpy as np
 
 from ..config import TrackConfig
 from .landmarks import Landmark
+from .ledger import Loop
 from .lifecycle import Lifecycle
+from .mix_ups import disobeys
 from .scene import Scene
 from .smoother import Smoother
 
@@ -87,13 +92,18 @@ class Followers:
     ) -> None:
         self._scene, self._smoother, self._lifecycle, self._tracks = scene, smoother, lifecycle, tracks
         self._watch = PoseWatch(config)
+        self._closed: set[int] = set()  # loop closures that were looked at, by number
 
     def follow(self) -> bool:
         """Brings everything to the poses of the updated smoother; whether they had been corrected at all.
 
         To be called after every update of the smoother that added a keyframe: it is then known where each was.
         """
-        if not self._watch.moved(self._smoother.poses()):
+        poses = self._smoother.poses()
+        moved, closed = self._watch.moved(poses), self._newly_closed()
+        if closed and (moved or any(disobeys(loop, poses) for loop in closed)):
+            moved |= self._lifecycle.separate()
+        if not moved:
             return False
         for _ in range(REUNIONS):
             self._bring_along()
@@ -102,6 +112,13 @@ class Followers:
         else:
             self._bring_along()
         return True
+
+    def _newly_closed(self) -> list[Loop]:
+        """Loop closures that came since the last time."""
+        loops = self._smoother.loops()
+        closed = [loop for number, loop in loops.items() if number not in self._closed]
+        self._closed = set(loops)
+        return closed
 
     def _bring_along(self) -> None:
         self._lifecycle.bring_up_to_date()

@@ -17,9 +17,9 @@ import numpy as np
 
 from ...datasets.errors import InputError
 
-SCHEMA = "thingmap-ledger/3"
-# 1 knew no parts: what has a default since is filled with it; 2 knew no loop closures
-_READABLE = ("thingmap-ledger/1", "thingmap-ledger/2", SCHEMA)
+SCHEMA = "thingmap-ledger/4"
+# 1 knew no parts: what has a default since is filled with it; 2 knew no loop closures; 3 took no measurement back
+_READABLE = ("thingmap-ledger/1", "thingmap-ledger/2", "thingmap-ledger/3", SCHEMA)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -185,6 +185,22 @@ class Retire:
     landmark: int
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class DropMeasurement:
+    """The `DepthCentre`, `Box`, `Look` or `Scores` of this number was of something else: it leaves the graph."""
+
+    record: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Revive:
+    """A retired landmark was there all along: its measurements come back. (3,) position and log half-axes to start."""
+
+    landmark: int
+    position: np.ndarray
+    log_size: np.ndarray
+
+
 Record = (
     Gauge
     | Motion
@@ -202,10 +218,12 @@ Record = (
     | Site
     | Merge
     | Retire
+    | DropMeasurement
+    | Revive
 )
 KINDS: tuple[type, ...] = (
     Gauge, Motion, Visual, ScanMatch, Loop, DropLoop, UpPrior, Up,
-    NewLandmark, DepthCentre, Box, Look, Scores, Site, Merge, Retire,
+    NewLandmark, DepthCentre, Box, Look, Scores, Site, Merge, Retire, DropMeasurement, Revive,
 )  # fmt: skip
 Link = Motion | Visual | ScanMatch | Loop  # between two keyframes
 

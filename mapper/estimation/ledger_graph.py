@@ -97,11 +97,11 @@ class LedgerGraph(Estimates):
                 return
             self._rebuild()
 
-    def _rebuild(self) -> None:
-        """A fresh ISAM2 from the ledger, started from the last good estimate."""
+    def _rebuild(self, start: gtsam.Values | None = None) -> None:
+        """A fresh ISAM2 from the ledger, from the values in `start` and else from the last good estimate."""
         self.rebuilds += 1
         self._joint = None
-        sources = current_values(self._graph), self._snapshot, self._graph.values
+        sources = start or gtsam.Values(), current_values(self._graph), self._snapshot, self._graph.values
         start = start_values(sources, self.ledger, self._live, self._frozen)
         self.R_world_upright = upright_rotation(start.atUnit3(UP).point3())
         self._graph = IncrementalGraph(self._config)

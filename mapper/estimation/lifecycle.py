@@ -20,6 +20,7 @@ from .lifting import LiftedDetection
 from .outcomes import Outcome
 from .reunion import CANDIDATE_SIZE_SIGMA, distance, recall_retired, take_over, unite_candidates
 from .scene import Scene
+from .separation import separate
 from .size_site import initial_site, propagate, size_evidence
 from .smoother import Smoother
 from .tracks import Observation, Track
@@ -225,6 +226,12 @@ class Lifecycle:
             gone.add(other.number)
             self._outcomes[Outcome.MERGED] += 1
 
+    def separate(self) -> bool:
+        """A loop was closed: landmarks into which two things went become two; whether any did. All is solved then."""
+        done = separate(self._scene, self._smoother, self, self._model.scores, self._config)
+        self._outcomes[Outcome.SEPARATED] += done.made
+        return done.mixed > 0
+
     def reunite(self) -> bool:
         """Poses were corrected: whatever now turns out to be one thing becomes one; whether anything did.
 
@@ -232,7 +239,7 @@ class Lifecycle:
         """
         self._refused.clear()
         before = self._outcomes[Outcome.MERGED]
-        self.merge()
+        self.merge(all_seen=True)
         self._outcomes[Outcome.MERGED] += recall_retired(self._scene, self._smoother, self._config)
         configs = self._tracks, self._config
         self._outcomes[Outcome.MERGED] += unite_candidates(self._scene, self._smoother, self._observer, *configs)

@@ -1,10 +1,24 @@
-"""Which records of the ledger count in the graph, and for which landmark: merges, retirements and dropped loops."""
+"""Which records of the ledger count in the graph, and for which landmark: merges, retirements and what was dropped."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from .ledger import Box, DepthCentre, DropLoop, Ledger, Link, Loop, Motion, NewLandmark, Record, ScanMatch, Visual
+from .ledger import (
+    Box,
+    DepthCentre,
+    DropLoop,
+    DropMeasurement,
+    Ledger,
+    Link,
+    Loop,
+    Motion,
+    NewLandmark,
+    Record,
+    Revive,
+    ScanMatch,
+    Visual,
+)
 
 
 class LiveRecords:
@@ -12,6 +26,7 @@ class LiveRecords:
 
     def __init__(self) -> None:
         self._of_landmark: dict[int, list[int]] = {}  # live landmark -> numbers of its records, its birth first
+        self._retired: dict[int, list[int]] = {}  # the same of those that are out of the graph
         self._merged_into: dict[int, int] = {}
         self._links: dict[int, Link] = {}
         self._dropped: set[int] = set()
@@ -28,6 +43,13 @@ class LiveRecords:
             case DropLoop():
                 self._dropped.add(record.record)
                 self._links.pop(record.record, None)
+            case DropMeasurement():
+                self._dropped.add(record.record)
+                for numbers in (*self._of_landmark.values(), *self._retired.values()):
+                    if record.record in numbers:
+                        numbers.remove(record.record)
+            case Revive():
+                self._of_landmark[record.landmark] = self._retired.pop(record.landmark)
 
     def merge(self, kept: int, absorbed: int, numbers: Iterable[int]) -> None:
         """These measurements of `absorbed`, which has been taken out, and all that may still come count for `kept`."""
@@ -37,6 +59,10 @@ class LiveRecords:
     def take_out(self, landmark: int) -> list[int]:
         """Forgets a landmark; returns the numbers of its records, its birth first."""
         return self._of_landmark.pop(landmark)
+
+    def retire(self, landmark: int, numbers: list[int]) -> None:
+        """A landmark that was taken out may be revived with these records."""
+        self._retired[landmark] = numbers
 
     def owner(self, landmark: int) -> int:
         """The landmark that this one has been merged into, itself if none."""
@@ -57,7 +83,7 @@ class LiveRecords:
         return list(self._links.values())
 
     def is_dropped(self, number: int) -> bool:
-        """Whether a loop closure or visual motion was found wrong."""
+        """Whether a record was found wrong."""
         return number in self._dropped
 
     def counting(self, ledger: Ledger) -> Iterator[int]:

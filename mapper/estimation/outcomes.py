@@ -30,4 +30,5 @@ class Outcome(Enum):
     SEEN_THROUGH = "landmark's volume is empty in this view"
     OUT_OF_VIEW = "landmark outside the image"
     MERGED = "landmark merged into another"
+    SEPARATED = "landmark parted from one that had been taken for it"
     RETIRED = "landmark retired: no object"

@@ -9,7 +9,7 @@ import numpy as np
 from gtsam.symbol_shorthand import L, X
 
 from ...factors.odometry import pose3
-from .ledger import DepthCentre, DropLoop, Ledger, Merge, Retire, Site
+from .ledger import DepthCentre, DropLoop, DropMeasurement, Ledger, Merge, Motion, Retire, Site
 from .live_records import LiveRecords
 from .pose_graph import PoseGraph, solve_poses
 from .size_site import SizeSite
@@ -30,6 +30,8 @@ def replay(ledger: Ledger, smoother: Smoother) -> None:
                 smoother.set_site(record.landmark, SizeSite(record.mean, record.information))
             case DropLoop():
                 smoother.drop_loops([record.record])
+            case DropMeasurement():
+                smoother.drop_measurements([record.record])
             case _:
                 smoother.add(record)
 
@@ -41,13 +43,19 @@ def close_start(values: gtsam.Values, ledger: Ledger, live: LiveRecords) -> None
     both, things may stand behind the cameras that saw them.
     """
     graph = PoseGraph.of(ledger)
-    start = np.array([values.atPose3(X(t)).matrix() for t in range(1 + len(graph.motions))])
-    poses = solve_poses(graph, start)
+    keyframes = 1 + sum(isinstance(link, Motion) for link in graph.motions)
+    start = np.array([values.atPose3(X(t)).matrix() for t in range(keyframes)])
+    start_from(solve_poses(graph, start), values, ledger, live)
+
+
+def start_from(poses: np.ndarray, values: gtsam.Values, ledger: Ledger, live: LiveRecords) -> None:
+    """Moves the keyframes to (M, 4, 4) poses, and landmarks to where these saw them."""
     for t, T in enumerate(poses):
         values.update(X(t), pose3(T))
     for landmark, numbers in live.landmarks().items():
         seen = [record for record in map(ledger.__getitem__, numbers) if isinstance(record, DepthCentre)]
         if seen:
             places = [poses[r.keyframe, :3, :3] @ r.centre + poses[r.keyframe, :3, 3] for r in seen]
-            values.erase(L(landmark))
+            if values.exists(L(landmark)):
+                values.erase(L(landmark))
             values.insertPoint3(L(landmark), np.median(places, axis=0))

@@ -8,15 +8,12 @@ only because wrong poses looked for it where it is not counts again, as part of 
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..config import LifecycleConfig, TrackConfig
 from .beliefs import Belief
 from .evidence import Observer
 from .landmarks import Landmark, volume_overlaps
-from .ledger import Box, DepthCentre, Look, Scores
 from .scene import Scene
 from .smoother import Smoother
 from .tracks import Track
@@ -64,7 +61,7 @@ def recall_retired(scene: Scene, smoother: Smoother, config: LifecycleConfig) ->
 
     That is so where the very keyframes that spoke against the one showed the other, which nobody had seen before.
     Something else that was put in the same place afterwards is no such case, nor is what was retired beside a thing.
-    The landmark in the graph keeps its number.
+    The older of both keeps its number.
     """
     recalled = 0
     for retired in list(scene.retired.values()):
@@ -75,12 +72,12 @@ def recall_retired(scene: Scene, smoother: Smoother, config: LifecycleConfig) ->
         if nearest is None:
             continue
         landmark = landmarks[nearest]
-        said = [record for record in smoother.ledger if isinstance(record, DepthCentre | Box | Scores | Look)]
-        for record in said:
-            if smoother.owner(record.landmark) == retired.number:
-                smoother.add(replace(record, landmark=landmark.number))
-        take_over(landmark, retired)
-        del scene.retired[retired.number]
+        smoother.revive(retired.number, retired.position, retired.log_size, retired.size_site)
+        scene.landmarks[retired.number] = scene.retired.pop(retired.number)
+        kept, other = sorted((retired, landmark), key=lambda x: x.number)
+        smoother.merge(kept.number, other.number)
+        take_over(kept, other)
+        del scene.landmarks[other.number]
         recalled += 1
     return recalled
 

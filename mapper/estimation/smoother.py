@@ -16,23 +16,28 @@ from .ledger import (
     Box,
     DepthCentre,
     DropLoop,
+    DropMeasurement,
     Gauge,
     Ledger,
+    Look,
     Loop,
     Merge,
     Motion,
     NewLandmark,
     Record,
     Retire,
+    Revive,
     ScanMatch,
+    Scores,
     Site,
     UpPrior,
     Visual,
 )
 from .ledger_graph import LedgerGraph
 from .path_covariance import path_covariances
+from .rebuild import current_values
 from .record_factors import UP, site_factor
-from .replay import close_start, replay
+from .replay import close_start, replay, start_from
 from .size_site import SizeSite
 
 
@@ -89,6 +94,9 @@ class Smoother(LedgerGraph):
             self._freeze(record.keyframe)
         self._live.add(number, record)
         self._graph.queue(("record", number), factors)
+        if isinstance(record, Revive):
+            for measurement in self._live.landmarks()[record.landmark]:
+                self._queue_record(measurement)
         self._loops_changed |= isinstance(record, Loop)
         return number
 
@@ -110,8 +118,13 @@ class Smoother(LedgerGraph):
 
     def retire(self, landmark: int) -> None:
         """Takes a landmark and its measurements out of the graph."""
-        self._detach(landmark)
+        self._live.retire(landmark, self._detach(landmark))
         self.ledger.append(Retire(landmark))
+
+    def revive(self, landmark: int, position: np.ndarray, log_size: np.ndarray, site: SizeSite) -> None:
+        """Takes a retired landmark back, with its measurements: (3,) world; (3,) log half-axes; site of its class."""
+        self.add(Revive(landmark, position, log_size))
+        self.set_site(landmark, site)
 
     def drop_loops(self, numbers: Iterable[int]) -> None:
         """Takes loop closures (or other motions beside odometry) that were found wrong out of the graph.
@@ -132,6 +145,42 @@ class Smoother(LedgerGraph):
                 self.add(DropLoop(number))
                 self._loops_changed = True
 
+    def drop_measurements(self, numbers: Iterable[int]) -> None:
+        """Takes what was measured of something else than its landmark out of the graph; what is out already stays so.
+
+        Raises:
+            ValueError: a record of another kind; nothing is dropped.
+        """
+        numbers = sorted(set(numbers))
+        for number in numbers:
+            if not isinstance(self.ledger[number], DepthCentre | Box | Look | Scores):
+                raise ValueError(f"record {number} is a {type(self.ledger[number]).__name__}, not a measurement")
+        for number in numbers:
+            if not self._live.is_dropped(number):
+                self._graph.drop(("record", number))
+                self.add(DropMeasurement(number))
+
+    def solve_from(self, T_world_camera: np.ndarray) -> None:
+        """Solves anew with the keyframes at (M, 4, 4) and every landmark where these poses saw it.
+
+        For when the graph has to leave an optimum that wrong measurements made.
+        """
+        start = current_values(self._graph)
+        start_from(T_world_camera, start, self.ledger, self._live)
+        self._loops_changed = True  # solved to convergence, as when a loop closes
+        self._rebuild(start)
+        self._stand_upright()
+        self._loops_changed = False
+
+    def measurements(self, landmark: int) -> list[int]:
+        """Numbers of the depth centres and boxes of a landmark in the graph."""
+        numbers = self._live.landmarks()[landmark]
+        return [number for number in numbers if not isinstance(self.ledger[number], NewLandmark)]
+
+    def is_dropped(self, number: int) -> bool:
+        """Whether the record of this number in the ledger was found wrong."""
+        return self._live.is_dropped(number)
+
     def loops(self) -> dict[int, Loop]:
         """The loop closures in the graph by their numbers in the ledger."""
         return self._live.loops()
@@ -142,6 +191,8 @@ class Smoother(LedgerGraph):
 
     def _start_variables(self, record: Record) -> None:
         """Where the variables that come with a record start."""
+        if isinstance(record, Revive) and self._graph.isam.valueExists(L(record.landmark)):
+            self.update()  # its variables leave before they come again
         values = self._graph.values
         match record:
             case Gauge():
@@ -154,7 +205,10 @@ class Smoother(LedgerGraph):
                 before = values.atPose3(X(record.a)) if known else isam.calculateEstimatePose3(X(record.a))
                 values.insert(X(record.b), before.compose(pose3(record.T_a_b)))
                 self.keyframes = record.b + 1
-            case NewLandmark():
+            case NewLandmark() | Revive():
+                for key in (L(record.landmark), S(record.landmark)):
+                    if values.exists(key):  # of a saved ledger's landmark, retired since
+                        values.erase(key)
                 values.insertPoint3(L(record.landmark), record.position)
                 values.insert(S(record.landmark), record.log_size)
 

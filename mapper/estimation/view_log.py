@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -108,6 +108,16 @@ class ViewLog:
         whole = sum(1 << keyframe for keyframe in (*self._telling, *self._silent))
         for verdict, keyframes in enumerate(other._left_out):
             self._left_out[verdict] |= keyframes & ~whole & ~sum(self._left_out)
+
+    def take_out(self, keyframes: Iterable[int]) -> ViewLog:
+        """What these keyframes said was of something else: their notes, as the log of that."""
+        taken = ViewLog(self._keep_silent)
+        for keyframe in keyframes:
+            note = self._telling.get(keyframe) or self._silent.get(keyframe)
+            if note is not None:
+                taken.append(note)
+            self._forget(keyframe)
+        return taken
 
     def __len__(self) -> int:
         """Notes kept whole."""

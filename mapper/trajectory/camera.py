@@ -56,6 +56,7 @@ class CameraGraph:
         self._T_last_now: np.ndarray | None = None  # between the last two keyframes, as measured
         self._unmatched: tuple[int, Features, np.ndarray] | None = None  # the latest keyframe, until it is solved
         self._tracking = Tracking(np.eye(4), TrackingOutcome.GOOD)
+        self._jumped = False  # whether the last frame is the first that is LOST
         self._T_keyframe_camera = np.eye(4)
         self.tracked: Counter[TrackingOutcome] = Counter()  # frames by outcome
         self._up_sources: set[str] = set()
@@ -87,7 +88,9 @@ class CameraGraph:
             raise BrokenFrame(frame.name, FrameProblem.OTHER_CAMERA)
         if not self.started:
             self._odometry = make_odometry(self._config.odometry, frame.scan is not None)
+        was_lost = self._tracking.outcome is TrackingOutcome.LOST
         self._tracking = self._odometry.register(frame)
+        self._jumped = self._tracking.outcome is TrackingOutcome.LOST and not was_lost
         self.tracked[self._tracking.outcome] += 1
         T = self._tracking.T_odometry_camera
         if self._selector.is_keyframe(T, self._tracking.outcome) or not self.started:
@@ -100,9 +103,7 @@ class CameraGraph:
 
         To be followed by `smoother.update()`, and then by `match_keyframe`.
         """
-        for links in (self._loops, self._hybrid):
-            if links is not None:
-                links.collect(self.smoother.keyframes)
+        self._collect()
         step = self._odometry.keyframe()
         features = self._extract(frame) if frame.has_image and frame.scan is None else None
         if step is None:
@@ -115,7 +116,7 @@ class CameraGraph:
         if self._visual is not None and features is not None:
             self._visual.remember(number, features)
         self._T_keyframe_camera = self._frames.append(
-            frame.stamp, self._tracking.T_odometry_camera, number, is_keyframe=True
+            frame.stamp, self._tracking.T_odometry_camera, number, is_keyframe=True, is_jump=self._jumped
         )
         self._measure_up(frame, number, T_world_camera)
         if self._loops is not None and features is not None:
@@ -145,6 +146,14 @@ class CameraGraph:
             self._loops.finish(self.smoother.keyframes - 1)
         if self._hybrid is not None:
             self._hybrid.finish()
+
+    def _collect(self) -> None:
+        """Puts links that are due into the graph."""
+        adrift = not self._place.is_known
+        if self._loops is not None and self._loops.collect(self.smoother.keyframes, adrift) and adrift:
+            self.smoother.settle()  # the next keyframe goes on from the place that was recognised
+        if self._hybrid is not None:
+            self._hybrid.collect(self.smoother.keyframes)
 
     def _go_on(self, step: OdometryStep, features: Features | None) -> tuple[np.ndarray, int]:
         """The next keyframe, from the last one by odometry and by features; its (4, 4) pose and its number."""

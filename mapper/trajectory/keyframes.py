@@ -50,19 +50,26 @@ class FrameTrajectory:
         self._T_odometry_camera: list[np.ndarray] = []
         self._keyframe: list[int] = []
         self._is_keyframe: list[bool] = []
+        self._is_jump: list[bool] = []
         self._T_odometry_keyframe = np.eye(4)
 
     def __len__(self) -> int:
         return len(self._stamps)
 
-    def append(self, stamp: float, T_odometry_camera: np.ndarray, keyframe: int, is_keyframe: bool) -> np.ndarray:
-        """Adds a frame seen from (or being) keyframe number `keyframe`; returns (4, 4) `T_keyframe_camera`."""
+    def append(
+        self, stamp: float, T_odometry_camera: np.ndarray, keyframe: int, is_keyframe: bool, is_jump: bool = False
+    ) -> np.ndarray:
+        """Adds a frame seen from (or being) keyframe number `keyframe`; returns (4, 4) `T_keyframe_camera`.
+
+        `is_jump`: a keyframe whose motion from the frame before nothing measured.
+        """
         if is_keyframe:
             self._T_odometry_keyframe = T_odometry_camera
         self._stamps.append(stamp)
         self._T_odometry_camera.append(T_odometry_camera)
         self._keyframe.append(keyframe)
         self._is_keyframe.append(is_keyframe)
+        self._is_jump.append(is_jump)
         return inverse(self._T_odometry_keyframe) @ T_odometry_camera
 
     def keyframe_stamps(self) -> np.ndarray:
@@ -78,7 +85,7 @@ class FrameTrajectory:
 
         with s_i the share of the frames from a to b: it led as near to the truth as shares of the path or of the turn
         (2.6 mm on a rendered hand-held sequence, 4.7 on redkitchen; by odometry from a alone 3.0 and 8.8). Frames
-        after the last keyframe follow odometry from there.
+        after the last keyframe follow odometry from there, and so do frames before a jump: it is no error of theirs.
         """
         if not self._stamps:
             return np.empty(0), np.empty((0, 4, 4))
@@ -92,5 +99,6 @@ class FrameTrajectory:
         error = log(inverses(T_a_b_odometry) @ T_a_b_graph)
         interval = before[between]
         share = (np.arange(start[-1]) - a[interval]) / (b - a)[interval]
+        share[np.array(self._is_jump)[b][interval]] = 0.0
         poses[between] = poses[between] @ exp(share[:, None] * error[interval])
         return np.array(self._stamps), poses

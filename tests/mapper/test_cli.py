@@ -42,7 +42,8 @@ def test_help_lists_the_commands(thingmap):
         assert result.exit_code == 0 and result.stderr == ""
         for command in ("run", "detect", "query", "export", "info"):
             assert f"\n  {command} " in result.stdout
-    assert "--odometry <kiss-icp|poses>" in thingmap("run", "--help").stdout
+    described = " ".join(thingmap("run", "--help").stdout.split())
+    assert "--odometry SOURCE Camera motion: kiss-icp or small-gicp from depth" in described
 
 
 @pytest.mark.parametrize(
@@ -52,7 +53,10 @@ def test_help_lists_the_commands(thingmap):
         (["run"], "Missing argument 'SEQUENCE'; see thingmap run --help"),
         (["run", "here"], "Missing option"),
         (["run", "here", "-o", "there", "--stride", "0"], "--stride"),
-        (["run", "here", "-o", "there", "--odometry", "wheels"], "'kiss-icp', 'poses'"),
+        (
+            ["run", "sample:tabletop?frames=2", "-o", "there", "--odometry", "wheels"],
+            "kiss-icp, small-gicp, poses or a file",
+        ),
         (["run", "here", "-o", "there", "--max-frames", "few"], "--max-frames"),
         (["query", "out", "cup", "--near", "1", "2", "c"], "--near"),
         (["query", "out", "cup", "--min-probability", "2"], "--min-probability"),

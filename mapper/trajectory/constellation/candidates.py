@@ -13,6 +13,7 @@ from ...estimation.landmarks import Landmark
 from .matching import Constellation, ConstellationMatch
 
 VIEW_UNITS = (0.8, 0.52)  # m, rad (30 degrees): to about there a loop verified by features can be trusted
+FARTHEST = 2.0  # of these units together, beyond which depth has hardly anything to match
 SEEN_SHARE = 0.5  # of the most matched things that any two keyframes both saw: those with fewer are not proposed
 NEIGHBOURS = 3  # keyframes around a proposed one that would only say the same
 
@@ -38,7 +39,7 @@ def recent_and_old(
 ) -> tuple[list[Landmark], list[Landmark]]:
     """Confident landmarks first seen in the last `recent_keyframes`, and those not seen in the last `old_keyframes`.
 
-    Both in the order of their numbers; what was seen before and lately is in neither: it already ties the two together.
+    Both in the order of their numbers; what was seen before and lately is in neither, it is one thing already.
     """
     recent, old = [], []
     for landmark in sorted(landmarks, key=lambda one: one.number):
@@ -49,6 +50,29 @@ def recent_and_old(
         elif max(landmark.supporting) <= keyframe_now - config.old_keyframes:
             old.append(landmark)
     return recent, old
+
+
+def seen_again(
+    landmarks: Iterable[Landmark], keyframe_now: int, T_world_camera: np.ndarray, config: ConstellationConfig
+) -> list[LoopCandidate]:
+    """Pairs of keyframes that saw the same landmarks, known for what they are: now, and before `old_keyframes`.
+
+    After little drift a thing is recognised by where it lies. That ties the two times together, but as loosely as
+    things are measured; depth can do it a hundred times better where it is told, by the poses as they are, where from.
+    """
+    lately: list[set[int]] = []
+    before: list[set[int]] = []
+    for landmark in sorted(landmarks, key=lambda one: one.number):
+        if landmark.belief.existence < config.min_existence:
+            continue
+        now = {k for k in landmark.supporting if k > keyframe_now - config.again_keyframes}
+        then = {k for k in landmark.supporting if k <= keyframe_now - config.old_keyframes}
+        if now and then:
+            lately.append(now)
+            before.append(then)
+    if len(lately) < config.min_matches:
+        return []
+    return nearest_views(np.eye(4), lately, before, T_world_camera, config)
 
 
 def constellation_of(landmarks: Sequence[Landmark]) -> Constellation:
@@ -87,19 +111,33 @@ def loop_candidates(
         T_world_camera: (M, 4, 4) poses of all keyframes, by number, as they are before the correction.
         config: how many.
     """
-    recent, saw_recent = _witnesses([recent_supporting[i] for i, _ in match.pairs])
-    old, saw_old = _witnesses([old_supporting[j] for _, j in match.pairs])
+    recent = [recent_supporting[i] for i, _ in match.pairs]
+    return nearest_views(
+        match.T_old_recent, recent, [old_supporting[j] for _, j in match.pairs], T_world_camera, config
+    )
+
+
+def nearest_views(
+    T_old_recent: np.ndarray,
+    recent_supporting: Sequence[AbstractSet[int]],
+    old_supporting: Sequence[AbstractSet[int]],
+    T_world_camera: np.ndarray,
+    config: ConstellationConfig,
+) -> list[LoopCandidate]:
+    """`loop_candidates` of P matched things, given the keyframes that saw each lately, and those of long ago."""
+    recent, saw_recent = _witnesses(recent_supporting)
+    old, saw_old = _witnesses(old_supporting)
     if not len(recent) or not len(old):
         return []
     seen = saw_recent.T.astype(int) @ saw_old.astype(int)
     if seen.max() == 0:
         return []
-    before, now = T_world_camera[old], match.T_old_recent @ T_world_camera[recent]
+    before, now = T_world_camera[old], T_old_recent @ T_world_camera[recent]
     moved = np.linalg.norm(now[:, None, :3, 3] - before[None, :, :3, 3], axis=2)
     cosine = 0.5 * (np.einsum("aij,bij->ab", now[:, :3, :3], before[:, :3, :3]) - 1.0)
     turned = np.arccos(np.clip(cosine, -1.0, 1.0))
     apart = np.hypot(moved / VIEW_UNITS[0], turned / VIEW_UNITS[1])
-    apart[seen < SEEN_SHARE * seen.max()] = np.inf
+    apart[(seen < SEEN_SHARE * seen.max()) | (apart > FARTHEST)] = np.inf
     candidates: list[LoopCandidate] = []
     for index in np.argsort(apart, axis=None, kind="stable"):
         a, b = np.unravel_index(index, apart.shape)
@@ -112,7 +150,7 @@ def loop_candidates(
     return candidates
 
 
-def _witnesses(supporting: list[AbstractSet[int]]) -> tuple[np.ndarray, np.ndarray]:
+def _witnesses(supporting: Sequence[AbstractSet[int]]) -> tuple[np.ndarray, np.ndarray]:
     """(A,) keyframes that saw any of P things, ascending, and (P, A) bool, which saw which."""
     keyframes = np.array(sorted(set().union(*supporting)), dtype=int)
     saw = np.array([[int(keyframe) in one for keyframe in keyframes] for one in supporting], dtype=bool)

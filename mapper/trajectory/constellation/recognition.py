@@ -9,7 +9,7 @@ import numpy as np
 from ...config import ConstellationConfig
 from ...estimation.landmarks import Landmark
 from ...estimation.smoother import Smoother
-from .candidates import LoopCandidate, constellation_of, loop_candidates, recent_and_old
+from .candidates import LoopCandidate, constellation_of, loop_candidates, recent_and_old, seen_again
 from .fit import Drift
 from .matching import match_constellations
 
@@ -17,7 +17,9 @@ from .matching import match_constellations
 def same_places(
     landmarks: Iterable[Landmark], keyframe: int, smoother: Smoother, config: ConstellationConfig
 ) -> list[LoopCandidate]:
-    """Pairs of keyframes that saw the same things, if what was mapped lately lies as something mapped long ago.
+    """Pairs of keyframes that saw the same things, by what is known as one, and by what lies as if it were.
+
+    The latter where what was mapped lately lies as something mapped long ago.
 
     Args:
         landmarks: of the map.
@@ -25,6 +27,14 @@ def same_places(
         smoother: whose poses tell how far the camera may have drifted since.
         config: when things count as lately and as long ago mapped, and what is believed.
     """
+    landmarks = list(landmarks)
+    again = seen_again(landmarks, keyframe, smoother.poses(), config)
+    return again + _that_lie_alike(landmarks, keyframe, smoother, config)
+
+
+def _that_lie_alike(
+    landmarks: list[Landmark], keyframe: int, smoother: Smoother, config: ConstellationConfig
+) -> list[LoopCandidate]:
     recent, old = recent_and_old(landmarks, keyframe, config)
     if min(len(recent), len(old)) < config.min_matches:
         return []

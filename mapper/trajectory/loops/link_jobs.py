@@ -9,6 +9,7 @@ from enum import Enum
 import numpy as np
 
 from ...config import ScanConfig, VisualConfig
+from ..odometry.odometry import fused
 from ..rigid import inverse, rotation_angle
 from ..visual.feature_motion import RelativePose, relative_pose
 from .places import Place
@@ -76,6 +77,7 @@ def find_links(job: LinkJob) -> list[LinkFound]:
 
 def _verified(job: LinkJob, candidate: Candidate) -> RelativePose | None:
     c, guess = job.config, candidate.T_guess
+    seen = None
     if candidate.kind is LinkKind.ALIKE:
         seen = relative_pose(candidate.place.features, job.place.features, c.features, c.seed)
         if seen is None:
@@ -86,11 +88,14 @@ def _verified(job: LinkJob, candidate: Candidate) -> RelativePose | None:
     if candidate.kind is LinkKind.SAME_THINGS:
         return match_scans(a, b, guess, _from_afar(c.scans))
     motion = match_scans(a, b, guess, c.scans)
-    if motion is None or candidate.kind is LinkKind.NEAR:
+    if motion is None or seen is None:
         return motion
     off = inverse(guess) @ motion.T_a_b
-    agree = rotation_angle(off[:3, :3]) < c.agreement[0] and np.linalg.norm(off[:3, 3]) < c.agreement[1]
-    return motion if agree else None
+    if rotation_angle(off[:3, :3]) > c.agreement[0] or np.linalg.norm(off[:3, 3]) > c.agreement[1]:
+        return None
+    # what the depth leaves open, the features hold
+    T, covariance = fused(motion.T_a_b, motion.covariance, seen.T_a_b, seen.covariance)
+    return RelativePose(T, covariance, motion.inliers)
 
 
 def _from_afar(config: ScanConfig) -> ScanConfig:

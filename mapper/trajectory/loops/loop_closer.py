@@ -19,15 +19,18 @@ import numpy as np
 
 from ...config import MapperConfig
 from ...deferred import Deferred
-from ...estimation.ledger import Loop, ScanMatch
+from ...estimation.ledger import Link, Loop, ScanMatch
 from ...estimation.pose_graph import LoopCheck, PoseGraph, check_loops
 from ...estimation.smoother import Smoother
 from ..constellation.candidates import LoopCandidate
+from ..known_place import is_wide
 from ..rigid import inverse
 from ..visual.features import Features
 from .link_jobs import Candidate, LinkConfig, LinkFound, LinkJob, LinkKind, find_links
 from .places import Place, Places
 from .scan_matching import Scan
+
+UNMEASURED = 100.0  # variances of guessed motions are taken this many times, where loops are checked
 
 _owners = count()
 
@@ -69,11 +72,12 @@ class LoopCloser:
 
     def propose(self, keyframe: int, candidates: Iterable[LoopCandidate]) -> None:
         """Has pairs of keyframes matched that saw the same things; the nearest places stand for them."""
-        poses = self._smoother.poses()
+        poses, tried = self._smoother.poses(), set()
         for candidate in candidates:
             old, recent = (self._nearest_place(k, poses) for k in (candidate.old, candidate.recent))
-            if old is None or recent is None or old == recent:
-                continue
+            if old is None or recent is None or recent - old < self._config.min_age or (old, recent) in tried:
+                continue  # where an old place stands for the recent keyframe too, it is known well how they lie
+            tried.add((old, recent))
             T_old_old, T_recent_recent = (
                 inverse(poses[a]) @ poses[b] for a, b in ((old, candidate.old), (candidate.recent, recent))
             )
@@ -81,16 +85,22 @@ class LoopCloser:
             one = Candidate(self._places[old], LinkKind.SAME_THINGS, guess)
             self._submit(self._places[recent], (one,), keyframe)
 
-    def collect(self, keyframe: int) -> bool:
-        """Puts what is due by this keyframe into the smoother, to be solved with it; whether a loop was closed."""
-        links = [link for links in self._jobs.due(keyframe) for link in links]
+    def collect(self, keyframe: int, adrift: bool = False) -> bool:
+        """Puts what is due by this keyframe into the smoother, to be solved with it; whether a loop was closed.
+
+        While the camera is `adrift` everything is waited for, since nothing is mapped until a place is recognised; and
+        no place that looks alike is refused for where it is: the first one may have been the wrong one.
+        """
+        links = [link for links in (self._jobs.drain() if adrift else self._jobs.due(keyframe)) for link in links]
         verdicts = self._checks.due(keyframe)
-        return self._take(links, verdicts, keyframe)
+        return self._take(links, verdicts, keyframe, adrift)
 
     def finish(self, keyframe: int) -> bool:
         """Puts all that is outstanding into the smoother; whether a loop was closed."""
         links = [link for links in self._jobs.drain() for link in links]
-        return self._take(links, self._checks.drain(), keyframe)
+        closed = self._take(links, self._checks.drain(), keyframe)
+        self._take([], self._checks.drain(), keyframe)  # of the check that these may have called for
+        return closed
 
     def has_old_links(self, keyframe: int) -> bool:
         """Whether the camera was lately tied to a place of long ago: no other way of finding one is needed then."""
@@ -124,7 +134,7 @@ class LoopCloser:
         """Places that look alike, if there is no old place of which it is known how it lies."""
         c = self._config
         youngest = place.keyframe - (c.skip if adrift else c.min_age)
-        if youngest < 0 or self.has_old_links(place.keyframe):
+        if youngest < 0 or (self.has_old_links(place.keyframe) and not adrift):
             return []
         found = self._places.alike(place.features, c.candidates, youngest)
         return [Candidate(one, LinkKind.ALIKE, None) for one in found]
@@ -136,12 +146,16 @@ class LoopCloser:
         return (turn < self._config.known[0] ** 2) & (move < self._config.known[1] ** 2)
 
     def _nearest_place(self, keyframe: int, poses: np.ndarray) -> int | None:
+        """A place that can stand for a keyframe: near it, and it is known how they lie, whatever drifted elsewhere."""
         numbers, c = self._places.keyframes, self._config
         if not len(numbers):
             return None
         turned, moved = self._places.distances(poses, keyframe)
-        distance = np.hypot(turned / c.reach[0], moved / c.reach[1]) + 0.01 * np.abs(numbers - keyframe)
-        return int(numbers[np.argmin(distance)])
+        variances = np.diagonal(self._smoother.path_covariances(keyframe)[numbers], axis1=1, axis2=2)
+        unknown = (
+            np.sqrt(variances[:, :3].max(axis=1)) / c.known[0] + np.sqrt(variances[:, 3:].max(axis=1)) / c.known[1]
+        )
+        return int(numbers[np.argmin(np.hypot(turned / c.reach[0], moved / c.reach[1]) + unknown)])
 
     def _submit(self, place: Place, candidates: tuple[Candidate, ...], keyframe: int | None = None) -> None:
         if candidates:
@@ -150,14 +164,14 @@ class LoopCloser:
 
     # -- verdicts
 
-    def _take(self, links: list[LinkFound], verdicts: list[LoopCheck], keyframe: int) -> bool:
+    def _take(self, links: list[LinkFound], verdicts: list[LoopCheck], keyframe: int, adrift: bool = False) -> bool:
         closed = False
         poses = self._smoother.poses() if links else np.empty((0, 4, 4))
-        known: dict[int, np.ndarray] = {}
+        # before any enters: the first of several would make the others look too far off
+        known = {b: self._smoother.path_covariances(b) for b in {link.b for link in links}}
         for link in links:
-            if link.b not in known:
-                known[link.b] = self._smoother.path_covariances(link.b)
-            closed |= self._add(link, poses, known[link.b][link.a])
+            anywhere = adrift and link.kind is LinkKind.ALIKE
+            closed |= self._add(link, anywhere or self._agrees(link, poses, known[link.b][link.a]))
         for verdict in verdicts:
             wrong = verdict.outliers & self._smoother.loops().keys()
             self.outcomes["loops found wrong"] += len(wrong)
@@ -166,12 +180,13 @@ class LoopCloser:
             self._unchecked = 0
             self._smoother.settle()
             graph = PoseGraph.of(self._smoother.ledger)
+            graph = replace(graph, motions=tuple(_loosened(motion) for motion in graph.motions))
             self._checks.submit(keyframe, (graph, self._smoother.poses(), self._config.probability))
         return closed
 
-    def _add(self, link: LinkFound, poses: np.ndarray, known: np.ndarray) -> bool:
-        """A link that agrees with the estimate, known to (6, 6), enters the graph; whether it closes a loop."""
-        if not self._agrees(link, poses, known):
+    def _add(self, link: LinkFound, agrees: bool) -> bool:
+        """A link that agrees with the estimate enters the graph; whether it closes a loop."""
+        if not agrees:
             self.outcomes[f"{link.kind.value}, refused"] += 1
             return False
         self.outcomes[link.kind.value] += 1
@@ -186,11 +201,18 @@ class LoopCloser:
         return True
 
     def _agrees(self, link: LinkFound, poses: np.ndarray, known: np.ndarray) -> bool:
-        """Whether a link lies within the gate around the estimate."""
+        """Whether a link lies within the gate around the estimate, if there is one: no guess refuses a link."""
+        if is_wide(known):
+            return True
         expected = inverse(poses[link.a]) @ poses[link.b]
         off = gtsam.Pose3.Logmap(gtsam.Pose3(link.motion.T_a_b).between(gtsam.Pose3(expected)))
         floor = np.diag(np.repeat(np.square(self._config.gate_floor), 3))
         return bool(off @ np.linalg.solve(known + link.motion.covariance + floor, off) < self._config.gate)
+
+
+def _loosened(motion: Link) -> Link:
+    """A motion that nothing measured, left so open that no loop is found wrong for its sake."""
+    return replace(motion, covariance=UNMEASURED * motion.covariance) if is_wide(motion.covariance) else motion
 
 
 def check(job: tuple[PoseGraph, np.ndarray, float]) -> LoopCheck:

@@ -19,6 +19,7 @@ from ..rigid import nearest_rigid
 from ..visual.feature_motion import RelativePose
 
 THREADS = 1  # small_gicp adds in parallel: with more, the last bits differ from run to run, and a map must not
+MIN_POINTS = 100  # fewer hold no pose: of 10, all were partners of a fit that was 2 m off; of 0, small_gicp crashes
 EPSILON = 2e-4  # rad, m: steps smaller than this have converged
 
 
@@ -50,13 +51,15 @@ def match_scans(a: PreparedScan, b: PreparedScan, T_guess: np.ndarray, config: S
 
     Args:
         a, b: of two keyframes.
-        T_guess: (4, 4) `T_a_b`, to within the wide reach.
+        T_guess: (4, 4) `T_a_b`, to within about the wide reach.
         config: reaches, and the share of points that must have a partner.
 
     Returns:
-        None where the scans hardly overlap or the fit went further from the guess than the wide reach allows. Where
-        the overlap leaves directions open the covariance says so.
+        None where a scan has hardly any points, or the scans hardly overlap, or hardly agree where they do. Where the
+        overlap leaves directions open the covariance says so. How far it is from the guess is for the caller to judge.
     """
+    if min(len(a.points), len(b.points)) < MIN_POINTS:
+        return None
     T, inliers = T_guess, 0
     for reach in config.reaches:
         result = small_gicp.align(
@@ -76,4 +79,13 @@ def match_scans(a: PreparedScan, b: PreparedScan, T_guess: np.ndarray, config: S
         return None
     planes = point_to_plane_covariance(b.points, T, a.points)
     covariance = config.inflation * planes.covariance() + np.diag(np.repeat(np.square(config.covariance_floor), 3))
-    return RelativePose(T, covariance, int(inliers))
+    return RelativePose(T, covariance + _open_covariance(planes.information, config), int(inliers))
+
+
+def _open_covariance(information: np.ndarray, config: ScanConfig) -> np.ndarray:
+    """(6, 6) of a translation along what planes leave open, where edges and noise seem to hold it."""
+    strength, directions = np.linalg.eigh(information[3:, 3:])
+    weak = directions[:, strength <= config.degenerate_ratio * strength[-1]]
+    covariance = np.zeros((6, 6))
+    covariance[3:, 3:] = config.open_sigma**2 * weak @ weak.T
+    return covariance

@@ -18,6 +18,9 @@ from .gaussian_model import GaussianModel
 from .image_motion import ImageMotion
 from .odometry import KeyframeSteps, OdometryStep, Tracking, TrackingOutcome
 
+EVEN = 1.5  # frames this many times as far apart in time as those before, or as near, come at their usual pace
+MAX_GAP = 3.0  # times the last interval, for which the last velocity is taken to go on
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Guess:
@@ -49,6 +52,9 @@ class GicpOdometry:
         self._image = ImageMotion(config.flow)
         self._T = np.eye(4)
         self._motion = np.eye(4)  # of the last frame, the next one's guess
+        self._seconds = 0.0  # that it took
+        self._stamp: float | None = None
+        self._pace = 1.0  # time since the last frame, in those seconds
         self._source = np.empty((0, 3))  # points of the last frame, camera
         self._reference: np.ndarray | None = None  # points of the last keyframe, odometry's world
         self._open = np.zeros((6, 6))  # covariance of the last frame's pose along what its planes leave open
@@ -62,11 +68,14 @@ class GicpOdometry:
         points = self._points(frame)
         cloud = self._model.prepare(points)
         self._source = cloud.points()[:, :3].copy()
+        seconds = 0.0 if self._stamp is None else frame.stamp - self._stamp
+        self._pace = seconds / self._seconds if seconds > 0.0 and self._seconds > 0.0 else 1.0
         T, outcome = self._T, TrackingOutcome.GOOD
         self._open = np.zeros((6, 6))
         if not self._model.empty:
             T, outcome = self._align(frame, points, cloud, guess)
         self._T, self._motion = T, inverse(self._T) @ T
+        self._stamp, self._seconds = frame.stamp, seconds
         self._image.remember(frame)
         if outcome is TrackingOutcome.LOST:
             self._lose(cloud, points)
@@ -105,13 +114,34 @@ class GicpOdometry:
         self._take_in(cloud, points)
 
     def _guesses(self, frame: Frame, guess: np.ndarray | None) -> Iterator[_Guess]:
-        """The likeliest first; the image is only asked once the first has failed."""
+        """The likeliest first; of frames at a camera's rate the image is only asked once the first has failed."""
         c = self._config.gicp
-        yield _Guess(self._T @ (self._motion if guess is None else guess), c.guess_sigma)
+        wide = self._guess_sigma()
+        by_motion = _Guess(self._T @ (self._expected() if guess is None else guess), wide)
+        far_apart = self._stamp is not None and frame.stamp - self._stamp > c.far_apart
+        if not far_apart:
+            yield by_motion
         seen = self._image.since_last(frame)
         if seen is not None:
             yield _Guess(self._T @ seen, c.image_sigma)
-        yield _Guess(self._T, c.guess_sigma)
+        if far_apart:
+            yield by_motion
+        yield _Guess(self._T, wide)
+
+    def _expected(self) -> np.ndarray:
+        """(4, 4) `T_last_now` at the last velocity: frames in between may be missing."""
+        if 1.0 / EVEN < self._pace < EVEN:
+            return self._motion
+        velocity = gtsam.Pose3.Logmap(gtsam.Pose3(nearest_rigid(self._motion)))
+        return gtsam.Pose3.Expmap(min(self._pace, MAX_GAP) * velocity).matrix()
+
+    def _guess_sigma(self) -> tuple[float, float]:
+        """(rad, m) of the motion prior: what a hand's acceleration does grows with the square of the time."""
+        c = self._config.gicp
+        if self._pace < EVEN:
+            return c.guess_sigma
+        turn, move = (min(self._pace**2 * s, lost) for s, lost in zip(c.guess_sigma, c.lost_sigma, strict=True))
+        return turn, move
 
     def _align(
         self, frame: Frame, points: np.ndarray, cloud: small_gicp.PointCloud, guess: np.ndarray | None

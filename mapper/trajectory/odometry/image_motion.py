@@ -2,7 +2,8 @@
 
 Corners of the last image are followed into the present one (Lucas and Kanade, pyramidal), both ends are lifted by their
 depth, and the rigid motion between them is found as for features. Cheaper than matching features, and good for the
-few centimetres between frames; asked for only where the registration is in doubt.
+few centimetres between frames; asked for only where the registration is in doubt. Where too few can be followed, as
+between frames that are far apart, features are matched instead.
 """
 
 from __future__ import annotations
@@ -11,9 +12,11 @@ import cv2
 import numpy as np
 
 from ....datasets.frame import Frame
-from ...config import FlowConfig
-from ..visual.feature_motion import robust_motion
+from ...config import FlowConfig, VisualConfig
+from ..visual.feature_motion import relative_pose, robust_motion
+from ..visual.features import FeatureExtractor
 
+FEATURES = VisualConfig()
 SCALE = 2  # of the images: half resolution is enough for a guess, and a quarter of the time
 
 
@@ -29,10 +32,20 @@ class ImageMotion:
         self._last = frame
 
     def since_last(self, frame: Frame) -> np.ndarray | None:
-        """(4, 4) `T_last_now`; None without an image, or where too few corners agree on a motion."""
-        last, c = self._last, self._config
+        """(4, 4) `T_last_now`; None without an image, or where too few corners and features agree on one."""
+        last = self._last
         if last is None or last.color.size == 0 or frame.color.size == 0:
             return None
+        followed = self._by_flow(last, frame)
+        return followed if followed is not None else self._by_features(last, frame)
+
+    def _by_features(self, last: Frame, frame: Frame) -> np.ndarray | None:
+        extract = FeatureExtractor(FEATURES)
+        seen = relative_pose(extract(last), extract(frame), FEATURES, self._seed)
+        return None if seen is None else seen.T_a_b
+
+    def _by_flow(self, last: Frame, frame: Frame) -> np.ndarray | None:
+        c = self._config
         before, now = _small_grey(last), _small_grey(frame)
         corners = cv2.goodFeaturesToTrack(before, c.corners, c.quality, c.spacing)
         if corners is None or len(corners) < c.min_inliers:

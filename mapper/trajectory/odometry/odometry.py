@@ -59,7 +59,7 @@ def fused(
 def widened(
     T: np.ndarray, covariance: np.ndarray, T_other: np.ndarray, covariance_other: np.ndarray, gate: float
 ) -> np.ndarray:
-    """(6, 6) of a measurement that contradicts another one of the same motion, so wide that it no longer does.
+    """(6, 6) of a measurement; if it contradicts another of the same motion, wider by how far they are apart.
 
     Args:
         T, covariance: (4, 4), (6, 6) in its right tangent; the one in doubt.
@@ -67,8 +67,8 @@ def widened(
         gate: chi-square of 6 degrees of freedom, up to which the two agree and nothing is changed.
     """
     d = gtsam.Pose3.Logmap(gtsam.Pose3(nearest_rigid(T)).between(gtsam.Pose3(nearest_rigid(T_other))))
-    squared = float(d @ np.linalg.solve(covariance + covariance_other, d))
-    return covariance if squared <= gate else covariance * squared / len(d)
+    agree = d @ np.linalg.solve(covariance + covariance_other, d) <= gate
+    return covariance if agree else covariance + np.outer(d, d)
 
 
 class Odometry(Protocol):

@@ -33,11 +33,16 @@ class FeatureExtractor:
     def __init__(self, config: VisualConfig) -> None:
         self._config = config
         self._orb = cv2.ORB.create(config.features, fastThreshold=config.fast_threshold)
+        self._faint = cv2.ORB.create(config.faint_features, fastThreshold=config.faint_threshold)
 
     def __call__(self, frame: Frame) -> Features:
-        """Features within the depth range."""
+        """Features within the depth range; where an image shows few of them, faint ones too."""
         grey = cv2.cvtColor(frame.color, cv2.COLOR_RGB2GRAY)
-        found, descriptors = self._orb.detectAndCompute(grey, None)
+        features = self._features(self._orb, grey, frame)
+        return features if len(features) >= self._config.few_features else self._features(self._faint, grey, frame)
+
+    def _features(self, orb: cv2.ORB, grey: np.ndarray, frame: Frame) -> Features:
+        found, descriptors = orb.detectAndCompute(grey, None)
         if descriptors is None:
             return Features(np.empty((0, 32), dtype=np.uint8), np.empty((0, 3)))
         uv = np.array([p.pt for p in found])

@@ -11,6 +11,7 @@ from thingmap.mapper.config import TrackConfig
 from thingmap.mapper.estimation.beliefs import Belief
 from thingmap.mapper.estimation.corrections import REUNIONS, CorrectionConfig, Followers, PoseWatch
 from thingmap.mapper.estimation.landmarks import Landmark
+from thingmap.mapper.estimation.ledger import Loop
 from thingmap.mapper.estimation.scene import Scene
 
 CONFIG = CorrectionConfig(translation=0.01, rotation=0.005)
@@ -73,8 +74,13 @@ class Graph:
     def __init__(self, poses: np.ndarray) -> None:
         self.now = poses
 
+        self.closed: dict[int, Loop] = {}
+
     def poses(self) -> np.ndarray:
         return self.now
+
+    def loops(self) -> dict[int, Loop]:
+        return self.closed
 
 
 class Registrar:
@@ -82,9 +88,14 @@ class Registrar:
 
     def __init__(self, unions: int = 0) -> None:
         self.unions, self.brought, self.reunited = unions, 0, 0
+        self.separated, self.mixed = 0, False
 
     def bring_up_to_date(self) -> None:
         self.brought += 1
+
+    def separate(self) -> bool:
+        self.separated += 1
+        return self.mixed
 
     def reunite(self) -> bool:
         self.reunited += 1
@@ -135,3 +146,27 @@ def test_everything_is_brought_along_again_after_each_reunion(unions):
     assert followers.follow()
     assert registrar.reunited == min(unions + 1, REUNIONS)
     assert registrar.brought == min(unions, REUNIONS) + 1
+
+
+@pytest.mark.parametrize(
+    ("gap", "shift", "mixed", "separated", "followed"),
+    [
+        (0.0, 0.0, True, 0, False),  # obeyed, and nothing moved
+        (0.3, 0.0, True, 1, True),  # landmarks hold the poses against it
+        (0.3, 0.0, False, 1, False),  # something else does
+        (0.0, 1.0, False, 1, True),
+    ],
+)
+def test_landmarks_are_separated_where_a_new_loop_moves_poses_or_is_not_obeyed(gap, shift, mixed, separated, followed):
+    followers, graph, _, registrar = make()
+    graph.now, registrar.mixed = motion(shift) @ path(6), mixed
+    T_0_5 = np.linalg.inv(path(6)[0]) @ path(6)[5] @ motion(gap)
+    graph.closed = {7: Loop(0, 5, T_0_5, 1e-4 * np.eye(6))}
+    assert followers.follow() is followed and registrar.separated == separated
+    assert not followers.follow() and registrar.separated == separated  # once for each loop
+
+
+def test_without_a_loop_nothing_is_separated():
+    followers, graph, _, registrar = make()
+    graph.now = motion(1.0) @ path(6)
+    assert followers.follow() and not registrar.separated

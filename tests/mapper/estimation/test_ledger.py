@@ -19,6 +19,7 @@ from thingmap.mapper.estimation.ledger import (
     Box,
     DepthCentre,
     DropLoop,
+    DropMeasurement,
     Gauge,
     Ledger,
     Look,
@@ -27,6 +28,8 @@ from thingmap.mapper.estimation.ledger import (
     Motion,
     NewLandmark,
     Retire,
+    Revive,
+    ScanMatch,
     Scores,
     Site,
     Up,
@@ -55,6 +58,9 @@ def one_of_each(rng: np.random.Generator) -> list:
         Scores(1, 3, np.array([0.5, np.nan, 0.1], dtype=np.float32), 0.3, 0.9, 2),
         Merge(3, 4),
         Retire(3),
+        ScanMatch(0, 1, T, rng.random((6, 6))),
+        DropMeasurement(9),
+        Revive(3, rng.normal(size=3), rng.normal(size=3)),
     ]
 
 

@@ -184,3 +184,15 @@ def test_a_frame_without_depth_is_broken_and_changes_nothing(plane_frame):
     assert one is not None and two is not None
     np.testing.assert_array_equal(one.T_a_b, two.T_a_b)
     np.testing.assert_array_equal(one.covariance, two.covariance)
+
+
+def test_after_missing_frames_the_last_velocity_goes_on_and_is_less_sure(plane_frame):
+    odometry = GicpOdometry(SMALL)
+    for index in range(4):
+        odometry.register(plane_frame(CORNER, moved(x=0.01 * index), index))
+    odometry.register(plane_frame(CORNER, moved(x=0.05), 5))  # twice the time
+    first = next(odometry._guesses(plane_frame(CORNER), None))
+    assert odometry._pace == pytest.approx(2.0)
+    assert first.sigma == pytest.approx([4.0 * sigma for sigma in GicpConfig().guess_sigma])
+    odometry.register(plane_frame(CORNER, moved(x=0.06), 6))  # at the usual pace again: half the way of the last time
+    assert odometry._expected()[0, 3] == pytest.approx(0.01, abs=0.006)

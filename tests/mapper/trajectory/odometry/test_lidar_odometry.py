@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # `lidar_street` is there
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))  # `lidar_street` is there
 
 import lidar_street as world
 

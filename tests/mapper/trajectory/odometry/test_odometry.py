@@ -13,10 +13,11 @@ from scipy.spatial.transform import Rotation
 
 from thingmap.datasets.frame import BrokenFrame, Frame, FrameProblem
 from thingmap.mapper.config import KeyframeConfig, OdometryConfig, OdometrySource
+from thingmap.mapper.trajectory.depth_points import DepthPoints
 from thingmap.mapper.trajectory.keyframes import KeyframeSelector
 from thingmap.mapper.trajectory.odometry.given_odometry import PoseOdometry
 from thingmap.mapper.trajectory.odometry.kiss_odometry import KissOdometry
-from thingmap.mapper.trajectory.odometry.odometry import OdometryStep
+from thingmap.mapper.trajectory.odometry.odometry import OdometryStep, fused, widened
 from thingmap.mapper.trajectory.odometry.sources import make_odometry
 from thingmap.mapper.trajectory.rigid import inverse, rotation_angle
 
@@ -167,7 +168,7 @@ def test_a_frame_without_depth_in_range_is_broken_and_changes_nothing(plane_fram
 def test_points_are_those_of_every_few_pixels(plane_frame, step):
     """Put back into the image they are at its readings; a shifted grid would tilt the whole scene."""
     frame = plane_frame(CORNER)
-    points = KissOdometry(replace(SMALL, pixel_step=step))._points(frame)
+    points = DepthPoints(step, SMALL.min_range, SMALL.max_range)(frame)
     pixels = frame.intrinsics.project(points)
     column, row = np.rint(pixels).astype(int).T
     np.testing.assert_allclose(pixels, np.stack([column, row], axis=1), atol=1e-6)
@@ -228,3 +229,70 @@ def test_a_missing_pose_breaks_its_frame_and_changes_nothing(plane_frame):
 def test_the_configuration_names_the_odometry():
     assert isinstance(make_odometry(POSES), PoseOdometry)
     assert isinstance(make_odometry(OdometryConfig()), KissOdometry)
+
+
+# -- two measurements of one motion
+
+
+def spread(rng: np.random.Generator, size: float = 0.02) -> np.ndarray:
+    """(6, 6) some covariance."""
+    root = size * rng.normal(size=(6, 6))
+    return root @ root.T + np.diag(np.full(6, 1e-6))
+
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+@settings(deadline=None, derandomize=True, max_examples=50)
+@given(seeds, vectors)
+def test_the_mean_of_two_motions_lies_between_them(seed, rotation_vector):
+    rng = np.random.default_rng(seed)
+    T, one, other = transform(rotation_vector, rng.normal(size=3)), spread(rng), spread(rng)
+    d = 0.02 * rng.normal(size=6)
+    T_other = (gtsam.Pose3(T) * gtsam.Pose3.Expmap(d)).matrix()
+    mean, covariance = fused(T, one, T_other, other)
+    # the surer one counts for more: d_mean = (one^-1 + other^-1)^-1 other^-1 d
+    np.testing.assert_allclose(tangent(T, mean), one @ np.linalg.solve(one + other, d), atol=1e-9)
+    np.testing.assert_allclose(covariance, one @ np.linalg.solve(one + other, other), rtol=1e-5, atol=1e-10)
+    for each in (one, other):
+        assert np.linalg.eigvalsh(each - covariance).min() > -1e-9  # never less sure than either
+    swapped, _ = fused(T_other, other, T, one)
+    # each in its own tangent: alike but for the second order of d
+    assert np.linalg.norm(tangent(mean, swapped)) < 2.0 * np.linalg.norm(d) ** 2
+
+
+def test_an_open_direction_is_filled_by_the_other_measurement():
+    T, T_other = np.eye(4), transform([0.0, 0.0, 0.0], [0.05, 0.0, 0.004])
+    wall = np.diag(np.square([0.001, 0.001, 0.1, 0.2, 0.2, 0.001]))
+    features = np.diag(np.square(np.repeat([0.003, 0.004], 3)))
+    mean, covariance = fused(T, wall, T_other, features)
+    assert mean[0, 3] == pytest.approx(0.05, abs=1e-3) and mean[2, 3] == pytest.approx(0.004 / 17.0, rel=1e-3)
+    assert np.sqrt(np.diag(covariance)[3:]) == pytest.approx([0.004, 0.004, 0.001], rel=0.05)
+
+
+@settings(deadline=None, derandomize=True, max_examples=50)
+@given(seeds, st.floats(0.1, 20.0))
+def test_a_contradicted_motion_is_widened_and_one_that_agrees_is_not(seed, far):
+    rng = np.random.default_rng(seed)
+    T, own, other, gate = transform(rng.normal(size=3), rng.normal(size=3)), spread(rng), spread(rng, 0.01), 22.46
+    d = rng.normal(size=6)
+    d *= np.sqrt(far * gate / (d @ np.linalg.solve(own + other, d)))  # `far` times the gate
+    T_other = (gtsam.Pose3(T) * gtsam.Pose3.Expmap(d)).matrix()
+    if np.linalg.norm(d[:3]) > 3.0:
+        return  # more than half a turn is another motion
+    result = widened(T, own, T_other, other, gate)
+    if far < 0.999:
+        np.testing.assert_array_equal(result, own)
+    elif far > 1.001:
+        np.testing.assert_allclose(result, own * far * gate / 6.0, rtol=1e-6)
+        left = d @ np.linalg.solve(result + other, d)
+        assert left < far * gate  # it contradicts less; by how much less depends on which of the two was the surer
+
+
+def test_a_surer_motion_that_is_contradicted_follows_the_other():
+    """As when a bent local model snaps back: features say that nothing of the kind happened."""
+    own, features = np.diag(np.full(6, 0.001**2)), np.diag(np.square(np.repeat([0.003, 0.004], 3)))
+    T, T_other = transform([0.0, 0.0, 0.0], [0.08, 0.0, 0.0]), np.eye(4)
+    believed = fused(T, own, T_other, features)[0]
+    doubted = fused(T, widened(T, own, T_other, features, 22.46), T_other, features)[0]
+    assert believed[0, 3] > 0.07 and doubted[0, 3] < 0.02

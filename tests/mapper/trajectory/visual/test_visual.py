@@ -16,7 +16,7 @@ from thingmap.mapper.config import VisualConfig
 from thingmap.mapper.trajectory.rigid import rigid_motion
 from thingmap.mapper.trajectory.visual.feature_motion import RelativePose, relative_pose
 from thingmap.mapper.trajectory.visual.features import FeatureExtractor, Features
-from thingmap.mapper.trajectory.visual.visual_odometry import VisualOdometry
+from thingmap.mapper.trajectory.visual.visual_odometry import VisualEdge, VisualOdometry
 
 NO_FLOOR = VisualConfig(covariance_floor=(0.0, 0.0))
 
@@ -175,14 +175,21 @@ def true_motion(a: Frame, b: Frame) -> np.ndarray:
     return np.linalg.inv(a.T_world_camera) @ b.T_world_camera
 
 
+def next_keyframe(visual: VisualOdometry, number: int, features: Features) -> list[VisualEdge]:
+    """Measures a keyframe against those before, then remembers it for the next ones."""
+    edges = visual.edges(features)
+    visual.remember(number, features)
+    return edges
+
+
 def test_edges_between_rendered_frames_are_close_to_the_truth(tabletop):
     chosen = list(tabletop[::7])
     visual = VisualOdometry(VisualConfig(), 0)
     for number, frame in enumerate(chosen):
-        edges = visual.add_keyframe(number, extract(frame))
-        assert [(e.a, e.b) for e in edges] == ([(number - 1, number)] if number else [])
+        edges = next_keyframe(visual, number, extract(frame))
+        assert [e.a for e in edges] == ([number - 1] if number else [])
         for edge in edges:
-            truth = true_motion(chosen[edge.a], chosen[edge.b])
+            truth = true_motion(chosen[edge.a], frame)
             error = tangent(edge.motion.T_a_b, truth)
             assert edge.motion.inliers > 150
             assert np.linalg.norm(truth[:3, 3]) > 0.05
@@ -193,16 +200,24 @@ def test_edges_between_rendered_frames_are_close_to_the_truth(tabletop):
 
 def test_a_new_keyframe_is_measured_against_as_many_as_asked_for(tabletop):
     visual = VisualOdometry(VisualConfig(neighbours=2), 0)
-    found = [[(e.a, e.b) for e in visual.add_keyframe(i, extract(f))] for i, f in enumerate(tabletop[:9:3])]
-    assert found == [[], [(0, 1)], [(0, 2), (1, 2)]]
+    found = [[e.a for e in next_keyframe(visual, i, extract(f))] for i, f in enumerate(tabletop[:12:3])]
+    assert found == [[], [0], [0, 1], [1, 2]]
+
+
+def test_measuring_a_frame_does_not_make_it_a_keyframe(tabletop):
+    visual = VisualOdometry(VisualConfig(), 0)
+    next_keyframe(visual, 0, extract(tabletop[0]))
+    first, second = (visual.edges(extract(tabletop[6])) for _ in range(2))
+    assert [e.a for e in first] == [e.a for e in second] == [0]
+    np.testing.assert_array_equal(first[0].motion.T_a_b, second[0].motion.T_a_b)
 
 
 def test_the_same_images_give_the_same_edge(tabletop):
     runs = []
     for _ in range(2):
         visual = VisualOdometry(VisualConfig(), 7)
-        visual.add_keyframe(0, extract(tabletop[0]))
-        runs.append(visual.add_keyframe(1, extract(tabletop[6]))[0].motion)
+        next_keyframe(visual, 0, extract(tabletop[0]))
+        runs.append(next_keyframe(visual, 1, extract(tabletop[6]))[0].motion)
     np.testing.assert_array_equal(runs[0].T_a_b, runs[1].T_a_b)
     np.testing.assert_array_equal(runs[0].covariance, runs[1].covariance)
     assert runs[0].inliers == runs[1].inliers
@@ -223,7 +238,7 @@ def without_depth(frame: Frame) -> Frame:
 @pytest.mark.parametrize("spoil", [blank, out_of_range, without_depth])
 def test_without_features_or_their_depth_there_is_no_edge(tabletop, spoil):
     visual = VisualOdometry(VisualConfig(), 0)
-    assert visual.add_keyframe(0, extract(tabletop[0])) == []
-    assert visual.add_keyframe(1, extract(spoil(tabletop[3]))) == []
-    assert visual.add_keyframe(2, extract(tabletop[6])) == []  # its only neighbour has nothing to match
-    assert len(visual.add_keyframe(3, extract(tabletop[9]))) == 1
+    assert next_keyframe(visual, 0, extract(tabletop[0])) == []
+    assert next_keyframe(visual, 1, extract(spoil(tabletop[3]))) == []
+    assert next_keyframe(visual, 2, extract(tabletop[6])) == []  # its only neighbour has nothing to match
+    assert len(next_keyframe(visual, 3, extract(tabletop[9]))) == 1
