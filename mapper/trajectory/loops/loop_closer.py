@@ -29,6 +29,7 @@ from ..visual.features import Features
 from .link_jobs import Candidate, LinkConfig, LinkFound, LinkJob, LinkKind, find_links
 from .places import Place, Places
 from .scan_matching import Scan
+from .unconfirmed import Unconfirmed
 
 UNMEASURED = 100.0  # variances of guessed motions are taken this many times, where loops are checked
 
@@ -53,6 +54,7 @@ class LoopCloser:
         self._jobs = Deferred(find_links, config.loops.lag, config.loops.process)
         self._checks = Deferred(check, config.loops.check_lag, config.loops.process)
         self._unchecked = 0  # loops since the last check
+        self._unmeasured = Unconfirmed()
         self._last_linked = -(10**9)  # keyframe that was last tied to a place older than all of `ages`
         self.outcomes: Counter[str] = Counter()
 
@@ -170,8 +172,13 @@ class LoopCloser:
         # before any enters: the first of several would make the others look too far off
         known = {b: self._smoother.path_covariances(b) for b in {link.b for link in links}}
         for link in links:
-            anywhere = adrift and link.kind is LinkKind.ALIKE
-            closed |= self._add(link, anywhere or self._agrees(link, poses, known[link.b][link.a]))
+            if adrift and link.kind is LinkKind.ALIKE:
+                closed |= self._add(link, agrees=True)
+            elif is_wide(known[link.b][link.a]):
+                for one in self._unmeasured.confirmed(link, poses):
+                    closed |= self._add(one, agrees=True)
+            else:
+                closed |= self._add(link, self._agrees(link, poses, known[link.b][link.a]))
         for verdict in verdicts:
             wrong = verdict.outliers & self._smoother.loops().keys()
             self.outcomes["loops found wrong"] += len(wrong)
@@ -201,9 +208,7 @@ class LoopCloser:
         return True
 
     def _agrees(self, link: LinkFound, poses: np.ndarray, known: np.ndarray) -> bool:
-        """Whether a link lies within the gate around the estimate, if there is one: no guess refuses a link."""
-        if is_wide(known):
-            return True
+        """Whether a link lies within the gate around the estimate."""
         expected = inverse(poses[link.a]) @ poses[link.b]
         off = gtsam.Pose3.Logmap(gtsam.Pose3(link.motion.T_a_b).between(gtsam.Pose3(expected)))
         floor = np.diag(np.repeat(np.square(self._config.gate_floor), 3))
