@@ -24,9 +24,9 @@ from thingmap.mapper.config import MapperConfig
 from thingmap.mapper.estimation.association import Assignment, Targets
 from thingmap.mapper.estimation.beliefs import Belief
 from thingmap.mapper.estimation.evidence import Observer, score_evidence
-from thingmap.mapper.estimation.ledger import Up, Visual
 from thingmap.mapper.estimation.lifecycle import Lifecycle
 from thingmap.mapper.estimation.outcomes import Outcome
+from thingmap.mapper.estimation.records import Up, Visual
 from thingmap.mapper.estimation.scene import Scene
 from thingmap.mapper.estimation.smoother import Smoother
 from thingmap.mapper.estimation.view import View

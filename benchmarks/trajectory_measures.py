@@ -13,7 +13,8 @@ from surface_thickness import FusedSurfaces, Thickness, ThicknessConfig, poses_a
 from thingmap.datasets.errors import UserError
 from thingmap.datasets.sequence import Sequence
 from thingmap.factors.odometry import pose3
-from thingmap.mapper.estimation.ledger import DropLoop, Ledger, Loop, Motion, Visual
+from thingmap.mapper.estimation.ledger import Ledger
+from thingmap.mapper.estimation.records import DropLoop, Loop, Motion, Visual
 from thingmap.mapper.evaluation.inputs.alignment import align_poses, align_positions
 from thingmap.mapper.evaluation.protocols.trajectory_errors import (
     ErrorSummary,

@@ -22,9 +22,9 @@ import numpy as np
 
 from ..config import TrackConfig
 from .landmarks import Landmark
-from .ledger import Loop
 from .lifecycle import Lifecycle
 from .mix_ups import disobeys
+from .records import Loop
 from .scene import Scene
 from .smoother import Smoother
 

@@ -15,10 +15,10 @@ from ..config import EvidenceConfig
 from .association import Assignment, Targets
 from .beliefs import Belief
 from .landmarks import Landmark
-from .ledger import Box, DepthCentre, Look, Scores
 from .lifting import LiftedDetection
 from .looks import WHOLE, Looks, take_looks
 from .outcomes import Outcome
+from .records import Box, DepthCentre, Look, Scores
 from .scene import Scene
 from .smoother import Smoother
 from .tracks import Observation, Track

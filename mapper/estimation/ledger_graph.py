@@ -12,10 +12,11 @@ from ..config import SmootherConfig
 from ..map.upright import upright_rotation
 from .estimates import Estimates
 from .incremental import IncrementalGraph
-from .ledger import Ledger, Record
+from .ledger import Ledger
 from .live_records import LiveRecords
 from .rebuild import current_values, start_values
 from .record_factors import UP, FactorContext, record_factors, site_factor
+from .records import Record
 from .size_site import SizeSite
 
 REBUILD_STEPS = 10  # at most, Gauss-Newton steps after a rebuild, until nothing moves by more than the thresholds

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from .ledger import (
+from .ledger import Ledger
+from .records import (
     Box,
     DepthCentre,
     DropLoop,
     DropMeasurement,
-    Ledger,
     Link,
     Loop,
     Motion,

@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..config import LifecycleConfig
 from .landmarks import Landmark
-from .ledger import DepthCentre, Loop
+from .records import DepthCentre, Loop
 from .smoother import Smoother
 
 OBEYED = 22.46  # chi-square, 6 degrees of freedom, 99.9 %: a closure that the estimate is further from is not obeyed

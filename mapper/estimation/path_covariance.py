@@ -13,7 +13,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from ..trajectory.rigid import inverse
-from .ledger import Link
+from .records import Link
 
 LEVER = 2.0  # m, to what a camera sees: what weighs a path's rotation against its translation
 

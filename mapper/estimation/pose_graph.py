@@ -20,7 +20,8 @@ import numpy as np
 from gtsam.symbol_shorthand import X
 
 from ...factors.odometry import between_factor, gauge_prior, pose3
-from .ledger import DropLoop, Gauge, Ledger, Link, Loop, Motion, ScanMatch, Visual
+from .ledger import Ledger
+from .records import DropLoop, Gauge, Link, Loop, Motion, ScanMatch, Visual
 
 INLIER_WEIGHT = 0.5  # weights are 0 or 1 when it has converged
 

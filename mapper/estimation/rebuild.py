@@ -11,9 +11,10 @@ from gtsam.symbol_shorthand import F, L, S, X
 
 from ...factors.odometry import pose3
 from .incremental import IncrementalGraph
-from .ledger import Ledger, Motion, NewLandmark
+from .ledger import Ledger
 from .live_records import LiveRecords
 from .record_factors import UP
+from .records import Motion, NewLandmark
 
 
 def current_values(graph: IncrementalGraph) -> gtsam.Values:

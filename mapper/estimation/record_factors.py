@@ -27,7 +27,7 @@ from ...factors.depth_centre import depth_centre_factor
 from ...factors.guard import position_guard, size_guard
 from ...factors.odometry import between_factor, gauge_prior
 from ..config import SmootherConfig
-from .ledger import Box, DepthCentre, Gauge, Loop, Motion, NewLandmark, Record, ScanMatch, Up, UpPrior, Visual
+from .records import Box, DepthCentre, Gauge, Loop, Motion, NewLandmark, Record, ScanMatch, Up, UpPrior, Visual
 from .size_site import SizeSite
 
 UP = U(0)

@@ -9,9 +9,10 @@ import numpy as np
 from gtsam.symbol_shorthand import L, X
 
 from ...factors.odometry import pose3
-from .ledger import DepthCentre, DropLoop, DropMeasurement, Ledger, Merge, Motion, Retire, Site
+from .ledger import Ledger
 from .live_records import LiveRecords
 from .pose_graph import PoseGraph, solve_poses
+from .records import DepthCentre, DropLoop, DropMeasurement, Merge, Motion, Retire, Site
 from .size_site import SizeSite
 
 if TYPE_CHECKING:

@@ -18,9 +18,9 @@ from ...factors.score_model import ScoreModel
 from ..config import LifecycleConfig
 from .beliefs import Belief
 from .landmarks import Landmark
-from .ledger import Box, DepthCentre, Look, Scores
 from .mix_ups import LEAST_KEYFRAMES, MixUp, find_mix_ups, in_world
 from .pose_graph import PoseGraph, solve_poses
+from .records import Box, DepthCentre, Look, Scores
 from .scene import Scene
 from .smoother import Smoother
 

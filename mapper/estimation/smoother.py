@@ -12,13 +12,17 @@ from ...datasets.frame import Intrinsics
 from ...factors.odometry import pose3
 from ..config import SmootherConfig
 from ..map.upright import upright_rotation
-from .ledger import (
+from .ledger import Ledger
+from .ledger_graph import LedgerGraph
+from .path_covariance import path_covariances
+from .rebuild import current_values
+from .record_factors import UP, site_factor
+from .records import (
     Box,
     DepthCentre,
     DropLoop,
     DropMeasurement,
     Gauge,
-    Ledger,
     Look,
     Loop,
     Merge,
@@ -33,10 +37,6 @@ from .ledger import (
     UpPrior,
     Visual,
 )
-from .ledger_graph import LedgerGraph
-from .path_covariance import path_covariances
-from .rebuild import current_values
-from .record_factors import UP, site_factor
 from .replay import close_start, replay, start_from
 from .size_site import SizeSite
 

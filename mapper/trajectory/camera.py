@@ -10,7 +10,7 @@ import numpy as np
 
 from ...datasets.frame import BrokenFrame, Frame, FrameProblem
 from ..config import MapperConfig, OdometrySource
-from ..estimation.ledger import Up, Visual
+from ..estimation.records import Up, Visual
 from ..estimation.smoother import Smoother
 from ..estimation.view import View
 from ..map.object_map import MapFrame, UpDirection

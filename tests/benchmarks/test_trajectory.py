@@ -19,7 +19,8 @@ from trajectory_report import OWN_POSES, Row, describe, mean_and_worst
 from thingmap.datasets.errors import UserError
 from thingmap.datasets.synthetic.config import Preset, SyntheticConfig
 from thingmap.mapper.config import MapperConfig, OdometrySource
-from thingmap.mapper.estimation.ledger import DropLoop, Ledger, Loop, Motion
+from thingmap.mapper.estimation.ledger import Ledger
+from thingmap.mapper.estimation.records import DropLoop, Loop, Motion
 from thingmap.mapper.evaluation.uncertainty.consistency import Consistency
 from thingmap.mapper.trajectory.rigid import inverse
 

@@ -30,8 +30,9 @@ from thingmap.mapper.config import (
     TrackConfig,
 )
 from thingmap.mapper.estimation.landmarks import Landmark
-from thingmap.mapper.estimation.ledger import DropMeasurement, Ledger, Loop, Merge, Revive
+from thingmap.mapper.estimation.ledger import Ledger
 from thingmap.mapper.estimation.outcomes import Outcome
+from thingmap.mapper.estimation.records import DropMeasurement, Loop, Merge, Revive
 from thingmap.mapper.estimation.scene import Scene
 from thingmap.mapper.estimation.smoother import Smoother
 from thingmap.mapper.estimation.tracks import Track

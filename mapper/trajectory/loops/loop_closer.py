@@ -19,8 +19,8 @@ import numpy as np
 
 from ...config import MapperConfig
 from ...deferred import Deferred
-from ...estimation.ledger import Link, Loop, ScanMatch
 from ...estimation.pose_graph import LoopCheck, PoseGraph, check_loops
+from ...estimation.records import Link, Loop, ScanMatch
 from ...estimation.smoother import Smoother
 from ..constellation.candidates import LoopCandidate
 from ..known_place import is_wide

@@ -10,7 +10,7 @@ import numpy as np
 from ....datasets.frame import Frame
 from ...config import HybridConfig, MapperConfig
 from ...deferred import Deferred
-from ...estimation.ledger import Visual
+from ...estimation.records import Visual
 from ...estimation.smoother import Smoother
 from ..rgbd_view import RgbdView
 from .feature_motion import RelativePose

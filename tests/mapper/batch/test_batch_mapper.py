@@ -12,7 +12,8 @@ from thingmap.datasets.synthetic.sample import open_sample
 from thingmap.detectors.simulated import SimulatedDetector
 from thingmap.mapper.batch.batch_mapper import BatchMapper
 from thingmap.mapper.config import MapperConfig, OdometryConfig, OdometrySource
-from thingmap.mapper.estimation.ledger import Ledger, NewLandmark
+from thingmap.mapper.estimation.ledger import Ledger
+from thingmap.mapper.estimation.records import NewLandmark
 from thingmap.mapper.map.object_map import ObjectMap
 from thingmap.mapper.proposals.volumes import Volumes
 

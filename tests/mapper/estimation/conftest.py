@@ -21,11 +21,11 @@ from thingmap.factors.volume import project_volumes
 from thingmap.mapper.config import MapperConfig, SmootherConfig, TrackConfig
 from thingmap.mapper.estimation.association import associate
 from thingmap.mapper.estimation.evidence import Observer, class_evidence, score_evidence
-from thingmap.mapper.estimation.ledger import Box, DepthCentre, NewLandmark
 from thingmap.mapper.estimation.lifecycle import Lifecycle
 from thingmap.mapper.estimation.lifting import lift
 from thingmap.mapper.estimation.outcomes import Outcome
 from thingmap.mapper.estimation.record_factors import UP, FactorContext, record_factors, site_factor
+from thingmap.mapper.estimation.records import Box, DepthCentre, NewLandmark
 from thingmap.mapper.estimation.scene import Scene
 from thingmap.mapper.estimation.size_site import SizeSite
 from thingmap.mapper.estimation.smoother import Smoother

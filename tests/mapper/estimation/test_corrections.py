@@ -11,7 +11,7 @@ from thingmap.mapper.config import TrackConfig
 from thingmap.mapper.estimation.beliefs import Belief
 from thingmap.mapper.estimation.corrections import REUNIONS, CorrectionConfig, Followers, PoseWatch
 from thingmap.mapper.estimation.landmarks import Landmark
-from thingmap.mapper.estimation.ledger import Loop
+from thingmap.mapper.estimation.records import Loop
 from thingmap.mapper.estimation.scene import Scene
 
 CONFIG = CorrectionConfig(translation=0.01, rotation=0.005)

@@ -7,9 +7,9 @@ import pytest
 
 from thingmap.mapper.estimation.association import Assignment
 from thingmap.mapper.estimation.evidence import FIRST_MEASUREMENTS, score_evidence
-from thingmap.mapper.estimation.ledger import Box, DepthCentre, Look, Scores
 from thingmap.mapper.estimation.lifting import lift
 from thingmap.mapper.estimation.outcomes import Outcome
+from thingmap.mapper.estimation.records import Box, DepthCentre, Look, Scores
 
 CUP, BOWL = (0.6, 0.1, 0.02), (0.1, 0.6, 0.02)
 

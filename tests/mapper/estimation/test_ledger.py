@@ -13,15 +13,14 @@ from hypothesis import strategies as st
 
 from thingmap.datasets.errors import InputError
 from thingmap.mapper.estimation import ledger as ledger_module
-from thingmap.mapper.estimation.ledger import (
+from thingmap.mapper.estimation.ledger import SCHEMA, Ledger
+from thingmap.mapper.estimation.records import (
     KINDS,
-    SCHEMA,
     Box,
     DepthCentre,
     DropLoop,
     DropMeasurement,
     Gauge,
-    Ledger,
     Look,
     Loop,
     Merge,

@@ -7,8 +7,9 @@ import pytest
 
 from thingmap.mapper.config import MapperConfig, TrackConfig
 from thingmap.mapper.estimation.landmarks import volume_overlaps
-from thingmap.mapper.estimation.ledger import DepthCentre, Ledger, Look, Merge, NewLandmark, Retire, Scores
+from thingmap.mapper.estimation.ledger import Ledger
 from thingmap.mapper.estimation.outcomes import Outcome
+from thingmap.mapper.estimation.records import DepthCentre, Look, Merge, NewLandmark, Retire, Scores
 from thingmap.mapper.estimation.size_site import propagate
 from thingmap.mapper.estimation.smoother import Smoother
 

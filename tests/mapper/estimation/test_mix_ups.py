@@ -8,9 +8,9 @@ import pytest
 from thingmap.mapper.config import LifecycleConfig
 from thingmap.mapper.estimation.beliefs import Belief
 from thingmap.mapper.estimation.landmarks import Landmark
-from thingmap.mapper.estimation.ledger import DepthCentre, Loop
 from thingmap.mapper.estimation.mix_ups import MixUp, disobeys, find_mix_ups
 from thingmap.mapper.estimation.pose_graph import PoseGraph, solve_poses
+from thingmap.mapper.estimation.records import DepthCentre, Loop
 from thingmap.mapper.estimation.smoother import Smoother
 
 TIGHT, LOOSE = 1e-5 * np.eye(6), np.diag(np.repeat([0.2**2, 0.4**2], 3))

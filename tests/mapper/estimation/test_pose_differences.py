@@ -9,8 +9,8 @@ import numpy as np
 from gtsam.symbol_shorthand import L, X
 
 from thingmap.mapper.estimation.joint_marginals import JointMarginals
-from thingmap.mapper.estimation.ledger import Loop, Visual
 from thingmap.mapper.estimation.path_covariance import adjoints, path_covariances
+from thingmap.mapper.estimation.records import Loop, Visual
 from thingmap.mapper.estimation.smoother import Smoother
 
 STEP = np.diag([0.01, 0.02, 0.03, 0.02, 0.03, 0.05]) ** 2

@@ -11,8 +11,9 @@ import pytest
 from gtsam.symbol_shorthand import X
 
 from thingmap.factors.odometry import pose3
-from thingmap.mapper.estimation.ledger import DropLoop, Gauge, Ledger, Loop, Motion, UpPrior, Visual
+from thingmap.mapper.estimation.ledger import Ledger
 from thingmap.mapper.estimation.pose_graph import PoseGraph, check_loops, solve_poses
+from thingmap.mapper.estimation.records import DropLoop, Gauge, Loop, Motion, UpPrior, Visual
 
 STEP = np.repeat([0.002, 0.004], 3)  # rad, m: sigmas of odometry from one keyframe to the next
 LOOP = np.repeat([0.005, 0.01], 3)

@@ -11,7 +11,8 @@ from thingmap.datasets.frame import Intrinsics
 from thingmap.detectors.parts import part_box
 from thingmap.factors.volume import project_volumes
 from thingmap.mapper.config import SmootherConfig
-from thingmap.mapper.estimation.ledger import (
+from thingmap.mapper.estimation.record_factors import UP, FactorContext, record_factors, site_factor
+from thingmap.mapper.estimation.records import (
     Box,
     DepthCentre,
     DropLoop,
@@ -28,7 +29,6 @@ from thingmap.mapper.estimation.ledger import (
     UpPrior,
     Visual,
 )
-from thingmap.mapper.estimation.record_factors import UP, FactorContext, record_factors, site_factor
 from thingmap.mapper.estimation.size_site import SizeSite
 
 KINECT = Intrinsics(640, 480, 525.0, 525.0, 319.5, 239.5)

@@ -11,9 +11,9 @@ from thingmap.mapper.estimation.association import Assignment
 from thingmap.mapper.estimation.beliefs import Belief
 from thingmap.mapper.estimation.evidence import score_evidence
 from thingmap.mapper.estimation.landmarks import Landmark
-from thingmap.mapper.estimation.ledger import Box, DepthCentre, Scores
 from thingmap.mapper.estimation.lifting import lift
 from thingmap.mapper.estimation.outcomes import Outcome
+from thingmap.mapper.estimation.records import Box, DepthCentre, Scores
 from thingmap.mapper.estimation.reunion import contradict, distance, take_over
 from thingmap.mapper.estimation.smoother import Smoother
 

@@ -8,7 +8,7 @@ import pytest
 from gtsam.symbol_shorthand import L, S, X
 
 from thingmap.mapper.config import SmootherConfig
-from thingmap.mapper.estimation.ledger import Box, DepthCentre, Look, Retire, Scores, Visual
+from thingmap.mapper.estimation.records import Box, DepthCentre, Look, Retire, Scores, Visual
 from thingmap.mapper.estimation.size_site import SizeSite
 from thingmap.mapper.estimation.smoother import Smoother
 

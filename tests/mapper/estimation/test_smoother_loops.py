@@ -10,7 +10,8 @@ import pytest
 from gtsam.symbol_shorthand import L, S, X
 
 from thingmap.mapper.config import SmootherConfig
-from thingmap.mapper.estimation.ledger import DropLoop, Ledger, Loop, Motion, Visual
+from thingmap.mapper.estimation.ledger import Ledger
+from thingmap.mapper.estimation.records import DropLoop, Loop, Motion, Visual
 from thingmap.mapper.estimation.size_site import SizeSite
 from thingmap.mapper.estimation.smoother import Smoother
 

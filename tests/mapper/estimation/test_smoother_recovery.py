@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from thingmap.factors.volume import project_volumes
 from thingmap.mapper.config import SmootherConfig
-from thingmap.mapper.estimation.ledger import Box, DepthCentre, Ledger, Up
+from thingmap.mapper.estimation.ledger import Ledger
+from thingmap.mapper.estimation.records import Box, DepthCentre, Up
 from thingmap.mapper.estimation.size_site import SizeSite
 from thingmap.mapper.estimation.smoother import Smoother
 

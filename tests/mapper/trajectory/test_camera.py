@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from thingmap.datasets.frame import BrokenFrame, Frame
 from thingmap.mapper.config import MapperConfig, OdometryConfig, OdometrySource, UpConfig
-from thingmap.mapper.estimation.ledger import Motion, Up, UpPrior, Visual
+from thingmap.mapper.estimation.records import Motion, Up, UpPrior, Visual
 from thingmap.mapper.map.object_map import MapFrame
 from thingmap.mapper.trajectory.camera import CameraGraph
 

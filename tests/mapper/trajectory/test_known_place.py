@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from thingmap.mapper.config import LoopConfig
-from thingmap.mapper.estimation.ledger import Loop
+from thingmap.mapper.estimation.records import Loop
 from thingmap.mapper.estimation.smoother import Smoother
 from thingmap.mapper.trajectory.known_place import KnownPlace
 

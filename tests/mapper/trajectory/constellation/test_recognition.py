@@ -10,7 +10,7 @@ import pytest
 
 from thingmap.mapper.config import ConstellationConfig
 from thingmap.mapper.estimation.landmarks import Landmark
-from thingmap.mapper.estimation.ledger import Loop
+from thingmap.mapper.estimation.records import Loop
 from thingmap.mapper.trajectory.constellation.candidates import LoopCandidate
 from thingmap.mapper.trajectory.constellation.recognition import same_places
 from thingmap.mapper.trajectory.loops.link_jobs import LinkKind

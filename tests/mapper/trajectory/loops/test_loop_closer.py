@@ -10,7 +10,7 @@ import pytest
 from thingmap.datasets.synthetic.sample import open_sample
 from thingmap.detectors.simulated import SimulatedDetector
 from thingmap.mapper.config import LoopConfig, MapperConfig
-from thingmap.mapper.estimation.ledger import DropLoop, Loop, Motion, ScanMatch
+from thingmap.mapper.estimation.records import DropLoop, Loop, Motion, ScanMatch
 from thingmap.mapper.mapper import SemanticMapper
 from thingmap.mapper.trajectory.constellation.candidates import LoopCandidate
 

@@ -284,9 +284,10 @@ def test_a_contradicted_motion_is_widened_and_one_that_agrees_is_not(seed, far):
     if far < 0.999:
         np.testing.assert_array_equal(result, own)
     elif far > 1.001:
-        np.testing.assert_allclose(result, own * far * gate / 6.0, rtol=1e-6)
-        left = d @ np.linalg.solve(result + other, d)
-        assert left < far * gate  # it contradicts less; by how much less depends on which of the two was the surer
+        assert d @ np.linalg.solve(result + other, d) < 1.0  # it no longer does, and only along what they disagree in
+        across = rng.normal(size=6)
+        across -= (across @ d) / (d @ d) * d
+        assert across @ result @ across == pytest.approx(across @ own @ across, rel=1e-6)
 
 
 def test_a_surer_motion_that_is_contradicted_follows_the_other():

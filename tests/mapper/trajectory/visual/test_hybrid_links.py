@@ -10,7 +10,7 @@ import pytest
 
 from thingmap.datasets.frame import Frame
 from thingmap.mapper.config import LoopConfig, MapperConfig, SmootherConfig
-from thingmap.mapper.estimation.ledger import Motion, Visual
+from thingmap.mapper.estimation.records import Motion, Visual
 from thingmap.mapper.estimation.smoother import Smoother
 from thingmap.mapper.trajectory.twist import exp, log
 from thingmap.mapper.trajectory.visual.hybrid_links import HybridLinks
