@@ -33,8 +33,13 @@ from thingmap.mapper.config import MapperConfig
 from thingmap.mapper.estimation.ledger import Ledger
 from thingmap.mapper.mapper import SemanticMapper
 from thingmap.mapper.runner import run_sequence
+from thingmap.mapper.trajectory.keyframes import KeyframeSelector
 from thingmap.mapper.trajectory.odometry.odometry import Tracking
 from thingmap.mapper.trajectory.odometry.sources import make_odometry
+from thingmap.mapper.trajectory.rigid import inverse
+
+APART = (1, 5, 20)  # keyframes, between those whose relative pose is judged
+PAIRS = 60  # at most, of a sequence
 
 
 def scene_folder(config: SyntheticConfig, folder: Path) -> Path:
@@ -80,12 +85,23 @@ def map_sequence(sequence: Frames, detector: str, config: MapperConfig) -> Mappe
         ledger, _ = Ledger.load(path)
     stamps, poses = mapper.trajectory()
     outcomes = mapper.statistics().get("tracking", {})
-    return Mapped(stamps, poses, mapper.keyframes()[0], ledger, outcomes)
+    keyframe_stamps, keyframe_poses, _ = mapper.keyframes()
+    pairs = {n: _pairs(mapper, keyframe_poses, n) for n in APART}
+    return Mapped(stamps, poses, keyframe_stamps, ledger, outcomes, pairs)
+
+
+def _pairs(mapper: SemanticMapper, poses: np.ndarray, apart: int) -> list[tuple[int, int, np.ndarray, np.ndarray]]:
+    """(a, b, T_a_b, covariance) of keyframes so many apart; no two of the pairs overlap, and at most `PAIRS`."""
+    first = range(0, len(poses) - apart, max(apart, len(poses) // PAIRS))
+    return [
+        (a, a + apart, inverse(poses[a]) @ poses[a + apart], mapper.relative_covariance(a, a + apart)) for a in first
+    ]
 
 
 def track_sequence(sequence: Frames, config: MapperConfig, kiss_alone: bool = False) -> Mapped:
     """By the configuration's odometry alone, or by KISS-ICP without anything of ours."""
     odometry, stamps, poses, outcomes = None, [], [], Counter()
+    selector = KeyframeSelector(config.keyframes)
     for frame in usable_frames(sequence, lambda broken: None):
         if odometry is None:
             alone = KissAlone(config.odometry) if kiss_alone else None
@@ -96,6 +112,10 @@ def track_sequence(sequence: Frames, config: MapperConfig, kiss_alone: bool = Fa
             continue
         if isinstance(tracking, Tracking):
             outcomes[tracking.outcome.value] += 1
+            if not isinstance(odometry, KissAlone) and selector.is_keyframe(
+                tracking.T_odometry_camera, tracking.outcome
+            ):
+                odometry.keyframe()  # by which it tells what the geometry in view leaves open
         stamps.append(frame.stamp)
         poses.append(tracking.T_odometry_camera if isinstance(tracking, Tracking) else tracking)
     return Mapped(np.array(stamps), np.array(poses).reshape(-1, 4, 4), np.empty(0), Ledger(), outcomes)

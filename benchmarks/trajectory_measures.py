@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import gtsam
@@ -14,7 +14,7 @@ from thingmap.datasets.errors import UserError
 from thingmap.datasets.sequence import Sequence
 from thingmap.factors.odometry import pose3
 from thingmap.mapper.estimation.ledger import Ledger
-from thingmap.mapper.estimation.records import DropLoop, Loop, Motion, Visual
+from thingmap.mapper.estimation.records import DropLoop, Loop, Motion, ScanMatch, Visual
 from thingmap.mapper.evaluation.inputs.alignment import align_poses, align_positions
 from thingmap.mapper.evaluation.protocols.trajectory_errors import (
     ErrorSummary,
@@ -24,7 +24,7 @@ from thingmap.mapper.evaluation.protocols.trajectory_errors import (
 )
 from thingmap.mapper.evaluation.uncertainty.consistency import Consistency, measure_consistency
 
-STEPS = (Motion, Visual, Loop)  # records that measure the motion between two keyframes
+STEPS = (Motion, Visual, ScanMatch, Loop)  # records that measure the motion between two keyframes
 IMAGES = 60  # at least, of a short sequence, that its cloud is fused from
 
 
@@ -48,6 +48,7 @@ class Mapped:
         keyframe_stamps: (M,) seconds; none of an odometry alone.
         ledger: its measurements; none of an odometry alone.
         outcomes: frames by how well they were tracked ("good", "degenerate", "lost"), as far as the mapper tells.
+        estimated: (a, b, T_a_b, covariance) of pairs of keyframes as the graph has them, by how many are between.
     """
 
     stamps: np.ndarray
@@ -55,6 +56,7 @@ class Mapped:
     keyframe_stamps: np.ndarray
     ledger: Ledger
     outcomes: Mapping[str, int]
+    estimated: Mapping[int, list[tuple[int, int, np.ndarray, np.ndarray]]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,7 +121,7 @@ def measure(mapped: Mapped, sequence: HasPoses, surfaces: FusedSurfaces | None =
 
 
 def step_consistency(mapped: Mapped, sequence: HasPoses, gone: set[int]) -> dict[str, Consistency]:
-    """NEES of the motions between keyframes by kind of record; of those taken out again (`gone`) none.
+    """NEES of the motions between keyframes, by kind of record (of those taken out again, `gone`, none) and estimated.
 
     e = Log(T_a_b^-1 X_a^-1 X_b) with the true X, in the tangent that the records' covariances are of.
     """
@@ -130,12 +132,21 @@ def step_consistency(mapped: Mapped, sequence: HasPoses, gone: set[int]) -> dict
         errors, covariances = [], []
         for number, record in enumerate(mapped.ledger):
             if type(record) is kind and number not in gone and np.isfinite(truth[[record.a, record.b]]).all():
-                a, b = pose3(truth[record.a]), pose3(truth[record.b])
-                errors.append(gtsam.Pose3.Logmap(pose3(record.T_a_b).between(a.between(b))))
+                errors.append(_error(record.T_a_b, truth[record.a], truth[record.b]))
                 covariances.append(record.covariance)
         if errors:
             result[kind.__name__] = measure_consistency(np.array(errors), np.array(covariances))
+    for apart, pairs in mapped.estimated.items():
+        known = [pair for pair in pairs if np.isfinite(truth[list(pair[:2])]).all()]
+        if known:
+            errors = [_error(T_a_b, truth[a], truth[b]) for a, b, T_a_b, _ in known]
+            result[f"graph, {apart} apart"] = measure_consistency(np.array(errors), np.array([c for *_, c in known]))
     return result
+
+
+def _error(T_a_b: np.ndarray, T_world_a: np.ndarray, T_world_b: np.ndarray) -> np.ndarray:
+    """(6,) from a measured motion to the true one, in its right tangent [rad, m]."""
+    return gtsam.Pose3.Logmap(pose3(T_a_b).between(pose3(T_world_a).between(pose3(T_world_b))))
 
 
 def open_surfaces(sequence: Sequence) -> FusedSurfaces | None:

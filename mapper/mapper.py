@@ -218,6 +218,11 @@ class SemanticMapper:
         self._finish()
         return self._camera.keyframes()
 
+    def relative_covariance(self, a: int, b: int) -> np.ndarray:
+        """(6, 6) covariance of keyframe b as seen from keyframe a, in the right tangent of `T_a_b` [rad, m]."""
+        self._finish()
+        return self._camera.smoother.pose_difference_covariance(a, b)
+
     def cloud(self) -> tuple[np.ndarray, np.ndarray]:
         """(M, 3) float32 points, world, metres, and (M, 3) uint8 RGB, one a voxel."""
         self._finish()
