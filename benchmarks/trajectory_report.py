@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from results import table
-from trajectory_measures import STEPS, Measured
+from trajectory_measures import Measured
 
 from thingmap.mapper.evaluation.uncertainty.consistency import CONFIDENCE, Consistency
 
@@ -144,14 +144,16 @@ def _honesty(rows: Sequence[Row], titles: Mapping[str, str], results: Results) -
         return ""
     cells = []
     for row in exact:
-        for kind in (kind.__name__ for kind in STEPS):
+        kinds = dict.fromkeys(kind for one in results[row.name, name] for kind in one.steps)
+        for kind in kinds:
             found = [one.steps[kind] for one in results[row.name, name] if kind in one.steps]
             if found:
                 cells.append([row.name, kind, *_consistency(pool(found))])
     text = (
-        f"Motions between keyframes as the ledger of '{titles[name]}' has them, without those taken out again, against "
-        f"the true ones: mean NEES per degree of freedom with the {CONFIDENCE:.0%} band it would lie in were errors "
-        f"Gaussian, independent and of the stated covariances, and the share inside the {CONFIDENCE:.0%} ellipsoid. "
+        f"Motions between keyframes as the ledger of '{titles[name]}' has them, without those taken out again, and "
+        "those of its graph in the end (keyframes 1, 5 or 20 apart, by their joint covariance), against the true ones: "
+        f"mean NEES per degree of freedom with the {CONFIDENCE:.0%} band it would lie in were errors Gaussian, "
+        f"independent and of the stated covariances, and the share inside the {CONFIDENCE:.0%} ellipsoid. "
         "Neighbouring errors are not independent (one map, one scene), so that the true band is wider."
     )
     head = ["sequence", "record", "motions", "NEES / 6", "band", "inside", "verdict"]
