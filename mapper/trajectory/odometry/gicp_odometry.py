@@ -16,7 +16,7 @@ from ..depth_points import DepthPoints
 from ..rigid import inverse, nearest_rigid
 from .gaussian_model import GaussianModel
 from .image_motion import ImageMotion
-from .odometry import KeyframeSteps, OdometryStep, Tracking, TrackingOutcome
+from .odometry import KeyframeSteps, OdometryStep, Tracking, TrackingOutcome, weighed
 
 EVEN = 1.5  # frames this many times as far apart in time as those before, or as near, come at their usual pace
 MAX_GAP = 3.0  # times the last interval, for which the last velocity is taken to go on
@@ -205,10 +205,5 @@ class GicpOdometry:
 
 
 def _weigh(T: np.ndarray, planes: PlaneInformation, guess: _Guess) -> np.ndarray:
-    """The mean of registered pose and guess, in the right tangent at T, with their informations Lambda and W:
-
-    d = Log(T^-1 T_guess),     T Exp((Lambda + W)^-1 W d)
-    """
-    W = np.diag(np.repeat(np.square(guess.sigma), 3) ** -1)
-    d = gtsam.Pose3.Logmap(gtsam.Pose3(T).between(gtsam.Pose3(nearest_rigid(guess.T))))
-    return nearest_rigid(T @ gtsam.Pose3.Expmap(np.linalg.solve(planes.information + W, W @ d)).matrix())
+    """The mean of the registered pose and the guess: an open direction follows the guess."""
+    return weighed(T, planes.information, guess.T, np.diag(np.repeat(np.square(guess.sigma), 3) ** -1))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import gtsam
 import numpy as np
 from kiss_icp.config import KISSConfig
 from kiss_icp.kiss_icp import KissICP
@@ -15,7 +14,7 @@ from ....datasets.lidar import LidarScan
 from ....factors.plane_information import SAMPLES, PlaneInformation, point_to_plane_covariance
 from ...config import LidarConfig, OdometryConfig
 from ..rigid import inverse
-from .odometry import KeyframeSteps, OdometryStep, Tracking, TrackingOutcome
+from .odometry import KeyframeSteps, OdometryStep, Tracking, TrackingOutcome, weighed
 
 MIN_POINTS = 200  # fewer returns in range than this cannot be registered
 MAX_GAP = 5.0  # frames, over which the last velocity is taken to go on
@@ -122,7 +121,7 @@ class LidarOdometry:
             return T_guess, TrackingOutcome.LOST
         if planes.translation_eigenvalue_ratio < c.degenerate_ratio:
             self._information = _opened(planes, c.degenerate_ratio)
-            return _weigh(T, T_guess, self._information.information, c.guess_sigma), TrackingOutcome.DEGENERATE
+            return weighed(T, self._information.information, T_guess, _prior(c.guess_sigma)), TrackingOutcome.DEGENERATE
         icp.adaptive_threshold.update_model_deviation(inverse(T_guess) @ T)
         return T, TrackingOutcome.GOOD
 
@@ -156,11 +155,9 @@ def _opened(planes: PlaneInformation, ratio: float) -> PlaneInformation:
     return replace(planes, information=kept @ planes.information @ kept)
 
 
-def _weigh(T: np.ndarray, T_guess: np.ndarray, information: np.ndarray, guess_sigma: tuple[float, float]) -> np.ndarray:
-    """Mean of registration and guess by their information, in the right tangent at `T`: x = (Lambda + W)^-1 W d."""
-    W = np.diag(np.repeat(np.square(guess_sigma), 3) ** -1)
-    d = gtsam.Pose3.Logmap(gtsam.Pose3(T).between(gtsam.Pose3(T_guess)))
-    return T @ gtsam.Pose3.Expmap(np.linalg.solve(information + W, W @ d)).matrix()
+def _prior(sigma: tuple[float, float]) -> np.ndarray:
+    """(6, 6) information of a guess known to (rad, m)."""
+    return np.diag(np.repeat(np.square(sigma), 3) ** -1)
 
 
 def _rotations(motion: np.ndarray, share: np.ndarray) -> Rotation:

@@ -46,14 +46,19 @@ class OdometryStep:
 def fused(
     T: np.ndarray, covariance: np.ndarray, T_other: np.ndarray, covariance_other: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The mean of two measurements of one motion, (4, 4) with (6, 6) in their right tangents, and its covariance.
-
-    With informations Lambda and W: d = Log(T^-1 T_other), T Exp((Lambda + W)^-1 W d).
-    """
+    """The mean of two measurements of one motion, (4, 4) with (6, 6) in their right tangents, and its covariance."""
     information, other = np.linalg.inv(covariance), np.linalg.inv(covariance_other)
-    together = np.linalg.inv(information + other)
+    return weighed(T, information, T_other, other), np.linalg.inv(information + other)
+
+
+def weighed(T: np.ndarray, information: np.ndarray, T_other: np.ndarray, information_other: np.ndarray) -> np.ndarray:
+    """The mean of two poses by their informations Lambda and W in the right tangent at T; one may be singular.
+
+    d = Log(T^-1 T_other),     T Exp((Lambda + W)^-1 W d)
+    """
     d = gtsam.Pose3.Logmap(gtsam.Pose3(nearest_rigid(T)).between(gtsam.Pose3(nearest_rigid(T_other))))
-    return nearest_rigid(T @ gtsam.Pose3.Expmap(together @ other @ d).matrix()), together
+    x = np.linalg.solve(information + information_other, information_other @ d)
+    return nearest_rigid(T @ gtsam.Pose3.Expmap(x).matrix())
 
 
 def widened(
