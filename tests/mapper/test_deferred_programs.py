@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -13,8 +14,11 @@ import pytest
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals and process groups are those of POSIX")
 
+LIMIT = 60.0  # s, in which any program here ends
+
 PREFACE = f"""
-import sys, time
+import signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # whoever runs the tests may have it ignored
 sys.path.append({str(Path(__file__).parent)!r})
 import deferred_jobs
 from thingmap.mapper.deferred import Deferred
@@ -24,7 +28,11 @@ from thingmap.mapper.deferred import Deferred
 def start(script: Path, text: str) -> subprocess.Popen[str]:
     script.write_text(PREFACE + text)
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    return subprocess.Popen([sys.executable, str(script)], start_new_session=True, **pipes)
+    program = subprocess.Popen([sys.executable, str(script)], start_new_session=True, **pipes)
+    late = threading.Timer(LIMIT, program.kill)  # a program that hangs fails its test, and no more
+    late.daemon = True
+    late.start()
+    return program
 
 
 def is_gone(pid: int) -> bool:
