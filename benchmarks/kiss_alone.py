@@ -5,18 +5,17 @@ The preset is the one that did best on hand-held depth cameras; KISS-ICP's defau
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
-from kiss_icp.config import KISSConfig
 from kiss_icp.kiss_icp import KissICP
 
 from thingmap.datasets.frame import Frame
 from thingmap.mapper.config import OdometryConfig
 from thingmap.mapper.trajectory.depth_points import DepthPoints
+from thingmap.mapper.trajectory.odometry.kiss_config import kiss_config
 
-VOXEL_SIZE = 0.08  # m
-INITIAL_THRESHOLD = 0.1  # m
-MIN_MOTION = 0.005  # m
-MAX_ITERATIONS = 50
+PRESET = {"voxel_size": 0.08, "max_iterations": 50, "initial_threshold": 0.1, "min_motion": 0.005}  # m, -, m, m
 
 
 class KissAlone:
@@ -27,16 +26,8 @@ class KissAlone:
     """
 
     def __init__(self, config: OdometryConfig) -> None:
-        kiss = KISSConfig()
-        kiss.data.deskew = False
-        kiss.data.min_range, kiss.data.max_range = config.min_range, config.max_range
-        kiss.mapping.voxel_size = VOXEL_SIZE
-        kiss.registration.max_num_iterations = MAX_ITERATIONS
-        kiss.registration.max_num_threads = config.threads
-        kiss.adaptive_threshold.initial_threshold = INITIAL_THRESHOLD
-        kiss.adaptive_threshold.min_motion_th = MIN_MOTION
         self._points = DepthPoints(config.pixel_step, config.min_range, config.max_range)
-        self._icp = KissICP(kiss)
+        self._icp = KissICP(kiss_config(replace(config, **PRESET), config.threads))
 
     def register(self, frame: Frame) -> np.ndarray:
         """(4, 4) `T_first_camera`.

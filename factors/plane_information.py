@@ -55,6 +55,11 @@ class PlaneInformation:
     translation_eigenvalue_ratio: float
     pairs: int
 
+    def open_directions(self, ratio: float) -> np.ndarray:
+        """(3, n) camera-frame directions of translation held by at most a ratio of what holds the best one."""
+        strength, directions = np.linalg.eigh(self.information[3:, 3:])
+        return directions[:, strength <= ratio * strength[-1]]
+
     def covariance(self, guess_sigma_rad: float = 0.1, guess_sigma_m: float = 0.2) -> np.ndarray:
         """(6, 6) covariance [rot, trans]; open directions are as uncertain as the registration's first guess was."""
         guess = np.repeat([guess_sigma_rad**-2, guess_sigma_m**-2], 3)

@@ -283,7 +283,7 @@ class SemanticMapper:
         self._observer = Observer(self._scene, smoother, model, self.config.evidence, self._outcomes)
         members = self._scene, smoother, self._observer
         self._lifecycle = Lifecycle(*members, priors, model, self.config, self._outcomes)
-        self._followers = Followers(self._scene, smoother, self._lifecycle, self.config.tracks)
+        self._followers = Followers(self._scene, smoother, self._lifecycle, self.config.tracks, self.config.corrections)
 
     def _count_things(self) -> int:
         return sum(landmark.belief.existence >= PROBABLE for landmark in self._scene.landmarks.values())

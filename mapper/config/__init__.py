@@ -5,7 +5,7 @@ One YAML file may override any of it (`config_file.load_config`); its keys are t
 
 from __future__ import annotations
 
-from .back_end import LifecycleConfig, SmootherConfig
+from .back_end import CorrectionConfig, LifecycleConfig, SmootherConfig
 from .batch import BatchConfig, ScorePotential
 from .evidence import BeliefConfig, EvidenceConfig, PresenceConfig
 from .keyframes import HybridConfig, KeyframeConfig, ScanConfig, VisualConfig
@@ -20,6 +20,7 @@ __all__ = [
     "BeliefConfig",
     "CloudConfig",
     "ConstellationConfig",
+    "CorrectionConfig",
     "EvidenceConfig",
     "FlowConfig",
     "GicpConfig",

@@ -32,3 +32,11 @@ class LifecycleConfig:
     merge_extent: float = 0.5  # of the mean half axis: a partly seen object's centre is this uncertain
     retire_below: float = 0.02  # existence
     retire_views: float = 3.0  # effective views before a landmark can be retired
+
+
+@dataclass(frozen=True, slots=True)
+class CorrectionConfig:
+    """When poses count as corrected; what the graph moves them by otherwise is within the noise of their depth."""
+
+    translation: float = 0.01  # m
+    rotation: float = 0.005  # rad (0.3 degrees)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .back_end import LifecycleConfig, SmootherConfig
+from .back_end import CorrectionConfig, LifecycleConfig, SmootherConfig
 from .batch import BatchConfig
 from .evidence import BeliefConfig, EvidenceConfig
 from .keyframes import HybridConfig, KeyframeConfig, ScanConfig, VisualConfig
@@ -44,5 +44,6 @@ class MapperConfig:
     evidence: EvidenceConfig = field(default_factory=EvidenceConfig)
     smoother: SmootherConfig = field(default_factory=SmootherConfig)
     lifecycle: LifecycleConfig = field(default_factory=LifecycleConfig)
+    corrections: CorrectionConfig = field(default_factory=CorrectionConfig)
     batch: BatchConfig = field(default_factory=BatchConfig)
     cloud: CloudConfig = field(default_factory=CloudConfig)

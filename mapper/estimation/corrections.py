@@ -16,11 +16,9 @@ The cloud has `KeyframeCloud.rebuild`, since nothing here depends on it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from ..config import TrackConfig
+from ..config import CorrectionConfig, TrackConfig
 from .landmarks import Landmark
 from .lifecycle import Lifecycle
 from .mix_ups import disobeys
@@ -29,14 +27,6 @@ from .scene import Scene
 from .smoother import Smoother
 
 REUNIONS = 5  # at most; each merger moves what it merged, so that another may become possible
-
-
-@dataclass(frozen=True, slots=True)
-class CorrectionConfig:
-    """When poses count as corrected; what the graph moves them by otherwise is within the noise of their depth."""
-
-    translation: float = 0.01  # m
-    rotation: float = 0.005  # rad (0.3 degrees)
 
 
 class PoseWatch:
@@ -88,7 +78,7 @@ class Followers:
         smoother: Smoother,
         lifecycle: Lifecycle,
         tracks: TrackConfig,
-        config: CorrectionConfig = CorrectionConfig(),
+        config: CorrectionConfig,
     ) -> None:
         self._scene, self._smoother, self._lifecycle, self._tracks = scene, smoother, lifecycle, tracks
         self._watch = PoseWatch(config)

@@ -13,11 +13,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-import gtsam
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from ..config import LifecycleConfig
+from ..trajectory.rigid import inverse, tangent
 from .landmarks import Landmark
 from .records import DepthCentre, Loop
 from .smoother import Smoother
@@ -50,8 +50,7 @@ class MixUp:
 
 def disobeys(loop: Loop, poses: np.ndarray) -> bool:
     """Whether (M, 4, 4) poses are far from what a closure says, by its own covariance."""
-    gap = gtsam.Pose3(np.linalg.inv(loop.T_a_b) @ np.linalg.inv(poses[loop.a]) @ poses[loop.b])
-    off = gtsam.Pose3.Logmap(gap)
+    off = tangent(loop.T_a_b, inverse(poses[loop.a]) @ poses[loop.b])
     return bool(off @ np.linalg.solve(loop.covariance, off) > OBEYED)
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import gtsam
 import numpy as np
 
 from ..config import LoopConfig
 from ..estimation.smoother import Smoother
-from .rigid import inverse
+from .rigid import inverse, tangent
 
 KNOWN_SIGMA = (0.3, 0.3)  # rad, m: of a step; what is mapped after a worse one would be taken for other things
 AGREEMENT = (0.05, 0.08)  # rad, m: between a loop and the estimate that it is part of; LoopConfig.agreement
@@ -68,7 +67,7 @@ class KnownPlace:
 
 def _fits(T_measured: np.ndarray, T_estimated: np.ndarray) -> bool:
     """Of two (4, 4) motions."""
-    off = gtsam.Pose3.Logmap(gtsam.Pose3(T_measured).between(gtsam.Pose3(T_estimated)))
+    off = tangent(T_measured, T_estimated)
     return bool(np.linalg.norm(off[:3]) < AGREEMENT[0] and np.linalg.norm(off[3:]) < AGREEMENT[1])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gtsam
 import numpy as np
 
 
@@ -11,6 +12,21 @@ def inverse(T: np.ndarray) -> np.ndarray:
     result = np.eye(4)
     result[:3, :3], result[:3, 3] = R.T, -R.T @ t
     return result
+
+
+def tangent(T: np.ndarray, T_other: np.ndarray) -> np.ndarray:
+    """(6,) [rot, trans] rad, m, from one (4, 4) pose to another in the first one's right tangent: Log(T^-1 T_other)."""
+    return gtsam.Pose3.Logmap(gtsam.Pose3(nearest_rigid(T)).between(gtsam.Pose3(nearest_rigid(T_other))))
+
+
+def retracted(T: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """(4, 4) pose a (6,) step in its right tangent away: T Exp(step)."""
+    return nearest_rigid(T @ gtsam.Pose3.Expmap(step).matrix())
+
+
+def pose_covariance(sigma: tuple[float, float]) -> np.ndarray:
+    """(6, 6) of a pose known to (rad, m) in every direction."""
+    return np.diag(np.repeat(np.square(sigma), 3))
 
 
 def rotation_angle(R: np.ndarray) -> float:

@@ -13,7 +13,7 @@ from ..odometry.odometry import fused
 from ..rigid import inverse, rotation_angle
 from ..visual.feature_motion import RelativePose, relative_pose
 from .places import Place
-from .scan_matching import PreparedScan, Scan, match_scans
+from .scan_matching import PreparedScan, match_scans
 
 KEPT = 48  # prepared scans at hand, 1 MB each: neighbours are matched again and again
 
@@ -103,7 +103,7 @@ def _from_afar(config: ScanConfig) -> ScanConfig:
     return replace(config, reaches=(3.0 * config.reaches[0], *config.reaches), min_share=1.25 * config.min_share)
 
 
-_scans: OrderedDict[tuple[int, int], tuple[Scan, PreparedScan]] = OrderedDict()
+_scans: OrderedDict[tuple[int, int], PreparedScan] = OrderedDict()
 
 
 def _prepared(owner: int, place: Place, config: ScanConfig) -> PreparedScan:
@@ -111,8 +111,8 @@ def _prepared(owner: int, place: Place, config: ScanConfig) -> PreparedScan:
     key = owner, place.keyframe
     known = _scans.pop(key, None)
     if known is None:
-        known = place.scan, PreparedScan(place.scan, config)
+        known = PreparedScan(place.scan, config)
     _scans[key] = known
     while len(_scans) > KEPT:
         _scans.popitem(last=False)
-    return known[1]
+    return known

@@ -14,7 +14,6 @@ from collections.abc import Iterable
 from dataclasses import replace
 from itertools import count
 
-import gtsam
 import numpy as np
 
 from ...config import MapperConfig
@@ -24,7 +23,7 @@ from ...estimation.records import Link, Loop, ScanMatch
 from ...estimation.smoother import Smoother
 from ..constellation.candidates import LoopCandidate
 from ..known_place import is_wide
-from ..rigid import inverse
+from ..rigid import inverse, pose_covariance, tangent
 from ..visual.features import Features
 from .link_jobs import Candidate, LinkConfig, LinkFound, LinkJob, LinkKind, find_links
 from .places import Place, Places
@@ -209,10 +208,9 @@ class LoopCloser:
 
     def _agrees(self, link: LinkFound, poses: np.ndarray, known: np.ndarray) -> bool:
         """Whether a link lies within the gate around the estimate."""
-        expected = inverse(poses[link.a]) @ poses[link.b]
-        off = gtsam.Pose3.Logmap(gtsam.Pose3(link.motion.T_a_b).between(gtsam.Pose3(expected)))
-        floor = np.diag(np.repeat(np.square(self._config.gate_floor), 3))
-        return bool(off @ np.linalg.solve(known + link.motion.covariance + floor, off) < self._config.gate)
+        off = tangent(link.motion.T_a_b, inverse(poses[link.a]) @ poses[link.b])
+        covariance = known + link.motion.covariance + pose_covariance(self._config.gate_floor)
+        return bool(off @ np.linalg.solve(covariance, off) < self._config.gate)
 
 
 def _loosened(motion: Link) -> Link:

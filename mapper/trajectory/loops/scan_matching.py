@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 import small_gicp
 
-from ....factors.plane_information import point_to_plane_covariance
+from ....factors.plane_information import PlaneInformation, point_to_plane_covariance
 from ...config import ScanConfig
-from ..rigid import nearest_rigid
+from ..rigid import nearest_rigid, pose_covariance
 from ..visual.feature_motion import RelativePose
 
 THREADS = 1  # small_gicp adds in parallel: with more, the last bits differ from run to run, and a map must not
@@ -78,14 +78,13 @@ def match_scans(a: PreparedScan, b: PreparedScan, T_guess: np.ndarray, config: S
     if inliers < config.min_share * min(len(a.points), len(b.points)):
         return None
     planes = point_to_plane_covariance(b.points, T, a.points)
-    covariance = config.inflation * planes.covariance() + np.diag(np.repeat(np.square(config.covariance_floor), 3))
-    return RelativePose(T, covariance + _open_covariance(planes.information, config), int(inliers))
+    covariance = config.inflation * planes.covariance() + pose_covariance(config.covariance_floor)
+    return RelativePose(T, covariance + _open_covariance(planes, config), int(inliers))
 
 
-def _open_covariance(information: np.ndarray, config: ScanConfig) -> np.ndarray:
+def _open_covariance(planes: PlaneInformation, config: ScanConfig) -> np.ndarray:
     """(6, 6) of a translation along what planes leave open, where edges and noise seem to hold it."""
-    strength, directions = np.linalg.eigh(information[3:, 3:])
-    weak = directions[:, strength <= config.degenerate_ratio * strength[-1]]
+    weak = planes.open_directions(config.degenerate_ratio)
     covariance = np.zeros((6, 6))
     covariance[3:, 3:] = config.open_sigma**2 * weak @ weak.T
     return covariance

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import gtsam
 import numpy as np
@@ -13,7 +13,7 @@ from ....datasets.frame import Frame
 from ....factors.plane_information import PlaneInformation, point_to_plane_covariance
 from ...config import OdometryConfig
 from ..depth_points import DepthPoints
-from ..rigid import inverse, nearest_rigid
+from ..rigid import inverse, nearest_rigid, pose_covariance, retracted, tangent
 from .gaussian_model import GaussianModel
 from .image_motion import ImageMotion
 from .odometry import KeyframeSteps, OdometryStep, Tracking, TrackingOutcome, weighed
@@ -24,10 +24,11 @@ MAX_GAP = 3.0  # times the last interval, for which the last velocity is taken t
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Guess:
-    """Where a registration starts: (4, 4) pose, and its (rad, m) standard deviations."""
+    """Where a registration starts: (4, 4) pose, its (rad, m) standard deviations, and whether the image says so."""
 
     T: np.ndarray
     sigma: tuple[float, float]
+    by_image: bool = False
 
 
 class GicpOdometry:
@@ -45,9 +46,7 @@ class GicpOdometry:
     def __init__(self, config: OdometryConfig) -> None:
         self._config = config
         self._points = DepthPoints(config.pixel_step, config.min_range, config.max_range)
-        self._keyframes = KeyframeSteps(
-            replace(config, covariance_floor=config.gicp.covariance_floor, drift=config.gicp.drift)
-        )
+        self._keyframes = KeyframeSteps(config.gicp.covariance_floor, config.gicp.drift)
         self._model = GaussianModel(config.gicp)
         self._image = ImageMotion(config.flow)
         self._T = np.eye(4)
@@ -92,7 +91,7 @@ class GicpOdometry:
             moved = gtsam.Pose3(nearest_rigid(inverse(self._T) @ self._T_keyframe)).AdjointMap()
             covariance = covariance + moved @ self._open_at_keyframe @ moved.T
         if self._lost_since_keyframe:
-            covariance = covariance + np.diag(np.repeat(np.square(self._config.gicp.lost_sigma), 3))
+            covariance = covariance + pose_covariance(self._config.gicp.lost_sigma)
         lost = self._lost_in_a_row > 0
         self._lost_since_keyframe = lost  # the step away from a guessed pose is not known either
         self._T_keyframe, self._open_at_keyframe = self._T, self._open
@@ -123,7 +122,7 @@ class GicpOdometry:
             yield by_motion
         seen = self._image.since_last(frame)
         if seen is not None:
-            yield _Guess(self._T @ seen, c.image_sigma)
+            yield _Guess(self._T @ seen, c.image_sigma, by_image=True)
         if far_apart:
             yield by_motion
         yield _Guess(self._T, wide)
@@ -132,8 +131,7 @@ class GicpOdometry:
         """(4, 4) `T_last_now` at the last velocity: frames in between may be missing."""
         if 1.0 / EVEN < self._pace < EVEN:
             return self._motion
-        velocity = gtsam.Pose3.Logmap(gtsam.Pose3(nearest_rigid(self._motion)))
-        return gtsam.Pose3.Expmap(min(self._pace, MAX_GAP) * velocity).matrix()
+        return retracted(np.eye(4), min(self._pace, MAX_GAP) * tangent(np.eye(4), self._motion))
 
     def _guess_sigma(self) -> tuple[float, float]:
         """(rad, m) of the motion prior: what a hand's acceleration does grows with the square of the time."""
@@ -158,14 +156,14 @@ class GicpOdometry:
             planes = self._open_directions(fit.T, fit.translation_ratio)
             if planes is None:
                 return fit.T, TrackingOutcome.GOOD
-            if weak is None or start.sigma == c.image_sigma:
+            if weak is None or start.by_image:
                 weak = _weigh(fit.T, planes, start)
                 self._open[3:, 3:] = self._open_covariance(planes)
-            if start.sigma == c.image_sigma:
+            if start.by_image:
                 break
         if weak is not None:
             return weak, TrackingOutcome.DEGENERATE
-        by_image = [g for g in guesses if g.sigma == c.image_sigma]
+        by_image = [g for g in guesses if g.by_image]
         return nearest_rigid((by_image or guesses)[0].T), TrackingOutcome.LOST
 
     def _open_directions(self, T: np.ndarray, translation_ratio: float) -> PlaneInformation | None:
@@ -185,8 +183,7 @@ class GicpOdometry:
     def _open_covariance(self, planes: PlaneInformation) -> np.ndarray:
         """(3, 3) m^2 of a translation along what planes leave open."""
         c = self._config.gicp
-        strength, directions = np.linalg.eigh(planes.information[3:, 3:])
-        weak = directions[:, strength <= c.degenerate_ratio * strength[-1]]
+        weak = planes.open_directions(c.degenerate_ratio)
         return c.open_sigma**2 * weak @ weak.T
 
     def _lose(self, cloud: small_gicp.PointCloud, points: np.ndarray) -> None:
@@ -206,4 +203,4 @@ class GicpOdometry:
 
 def _weigh(T: np.ndarray, planes: PlaneInformation, guess: _Guess) -> np.ndarray:
     """The mean of the registered pose and the guess: an open direction follows the guess."""
-    return weighed(T, planes.information, guess.T, np.diag(np.repeat(np.square(guess.sigma), 3) ** -1))
+    return weighed(T, planes.information, guess.T, np.linalg.inv(pose_covariance(guess.sigma)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ from ....datasets.errors import InputError
 from ....datasets.frame import BrokenFrame, Frame, FrameProblem
 from ....datasets.poses import MAX_INTERPOLATION_GAP, MAX_STAMP_DIFFERENCE, StampedPoses, read_tum_poses
 from ...config import OdometryConfig
+from ..rigid import pose_covariance
 from .odometry import KeyframeSteps, OdometryStep, Tracking, TrackingOutcome
 
 
@@ -18,9 +18,8 @@ class PoseOdometry:
     """The dataset's own poses taken as measurements; the world is the dataset's."""
 
     def __init__(self, config: OdometryConfig) -> None:
-        sigma_r, sigma_t = config.pose_sigma
-        self._covariance = 2.0 * np.diag(np.repeat([sigma_r**2, sigma_t**2], 3))  # both ends are measured
-        self._keyframes = KeyframeSteps(config)
+        self._covariance = 2.0 * pose_covariance(config.pose_sigma)  # both ends are measured
+        self._keyframes = KeyframeSteps(config.covariance_floor, config.drift)
         self._T = np.eye(4)
 
     def register(self, frame: Frame, guess: np.ndarray | None = None) -> Tracking:
@@ -46,7 +45,7 @@ class TrajectoryOdometry:
 
     def __init__(self, config: OdometryConfig) -> None:
         self._trajectory = read_tum_poses(Path(config.path))
-        self._keyframes = KeyframeSteps(replace(config, covariance_floor=config.path_sigma, drift=config.path_drift))
+        self._keyframes = KeyframeSteps(config.path_sigma, config.path_drift)
         self._T = np.eye(4)
 
     def register(self, frame: Frame, guess: np.ndarray | None = None) -> Tracking:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import small_gicp
-from kiss_icp.config import KISSConfig
 from kiss_icp.kiss_icp import KissICP
 
 from ...config import OdometryConfig
 from ..rigid import inverse, nearest_rigid
 from .gicp_odometry import GicpOdometry
+from .kiss_config import kiss_config
 
 DIGITS = 9  # KISS-ICP adds in parallel, so its last bits differ from run to run; a map must not
 
@@ -24,7 +24,7 @@ class KissOdometry(GicpOdometry):
 
     def __init__(self, config: OdometryConfig) -> None:
         super().__init__(config)
-        self._icp = KissICP(_kiss_config(config))
+        self._icp = KissICP(kiss_config(config, config.threads))
         self._dense = np.empty((0, 3))
         self._T_guess = np.eye(4)
 
@@ -54,15 +54,3 @@ class KissOdometry(GicpOdometry):
     def _start_anew(self, cloud: small_gicp.PointCloud, points: np.ndarray) -> None:
         self._icp.local_map.clear()
         super()._start_anew(cloud, points)
-
-
-def _kiss_config(config: OdometryConfig) -> KISSConfig:
-    kiss = KISSConfig()
-    kiss.data.deskew = False
-    kiss.data.min_range, kiss.data.max_range = config.min_range, config.max_range
-    kiss.mapping.voxel_size = config.voxel_size
-    kiss.registration.max_num_iterations = config.max_iterations
-    kiss.registration.max_num_threads = config.threads
-    kiss.adaptive_threshold.initial_threshold = config.initial_threshold
-    kiss.adaptive_threshold.min_motion_th = config.min_motion
-    return kiss

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from kiss_icp.config import KISSConfig
 from kiss_icp.kiss_icp import KissICP
 from scipy.spatial.transform import Rotation
 
 from ....datasets.frame import BrokenFrame, Frame, FrameProblem
 from ....datasets.lidar import LidarScan
 from ....factors.plane_information import SAMPLES, PlaneInformation, point_to_plane_covariance
-from ...config import LidarConfig, OdometryConfig
-from ..rigid import inverse
+from ...config import OdometryConfig
+from ..rigid import inverse, nearest_rigid, pose_covariance
+from .kiss_config import kiss_config
 from .odometry import KeyframeSteps, OdometryStep, Tracking, TrackingOutcome, weighed
 
 MIN_POINTS = 200  # fewer returns in range than this cannot be registered
@@ -34,8 +34,8 @@ class LidarOdometry:
 
     def __init__(self, config: OdometryConfig) -> None:
         self._config = c = config.lidar
-        self._icp = KissICP(_kiss_config(c))
-        self._keyframes = KeyframeSteps(replace(config, covariance_floor=c.covariance_floor, drift=c.drift))
+        self._icp = KissICP(kiss_config(c, THREADS))
+        self._keyframes = KeyframeSteps(c.covariance_floor, c.drift)
         self._T = np.eye(4)
         self._motion = np.eye(4)  # T_last_now of the last frame
         self._seconds = 0.0  # that it took
@@ -72,7 +72,7 @@ class LidarOdometry:
             # two sweeps were matched to the same map
             covariance = 2.0 * self._information.covariance(*self._config.guess_sigma)
         if self._lost_since_keyframe:
-            covariance = covariance + np.diag(np.repeat(np.square(self._config.lost_sigma), 3))
+            covariance = covariance + pose_covariance(self._config.lost_sigma)
         self._lost_since_keyframe = False
         return self._keyframes.step(self._T, covariance)
 
@@ -121,7 +121,8 @@ class LidarOdometry:
             return T_guess, TrackingOutcome.LOST
         if planes.translation_eigenvalue_ratio < c.degenerate_ratio:
             self._information = _opened(planes, c.degenerate_ratio)
-            return weighed(T, self._information.information, T_guess, _prior(c.guess_sigma)), TrackingOutcome.DEGENERATE
+            guess = np.linalg.inv(pose_covariance(c.guess_sigma))
+            return weighed(T, self._information.information, T_guess, guess), TrackingOutcome.DEGENERATE
         icp.adaptive_threshold.update_model_deviation(inverse(T_guess) @ T)
         return T, TrackingOutcome.GOOD
 
@@ -136,10 +137,7 @@ class LidarOdometry:
 
 def _rounded(T: np.ndarray) -> np.ndarray:
     """To `DIGITS`, the rotation exact again: KISS-ICP ends the interpreter on a guess whose rotation is off by 1e-9."""
-    result = np.round(T, DIGITS)
-    U, _, Vt = np.linalg.svd(result[:3, :3])
-    result[:3, :3] = U @ Vt
-    return result
+    return nearest_rigid(np.round(T, DIGITS))
 
 
 def _opened(planes: PlaneInformation, ratio: float) -> PlaneInformation:
@@ -148,16 +146,10 @@ def _opened(planes: PlaneInformation, ratio: float) -> PlaneInformation:
     Rings on a road and along walls seem to hold the way ahead: 300 points whose normals are off by a few degrees, all
     to the same side, are worth centimetres that are not there.
     """
-    strength, directions = np.linalg.eigh(planes.information[3:, 3:])
-    weak = directions[:, strength < ratio * strength[-1]]
+    weak = planes.open_directions(ratio)
     kept = np.eye(6)
     kept[3:, 3:] -= weak @ weak.T
     return replace(planes, information=kept @ planes.information @ kept)
-
-
-def _prior(sigma: tuple[float, float]) -> np.ndarray:
-    """(6, 6) information of a guess known to (rad, m)."""
-    return np.diag(np.repeat(np.square(sigma), 3) ** -1)
 
 
 def _rotations(motion: np.ndarray, share: np.ndarray) -> Rotation:
@@ -174,15 +166,3 @@ def _raised(points: np.ndarray, angle: float) -> np.ndarray:
     distance = np.linalg.norm(points, axis=1)
     scale = distance * np.cos(elevation) / np.maximum(level, 1e-9)
     return np.c_[points[:, :2] * scale[:, None], distance * np.sin(elevation)]
-
-
-def _kiss_config(config: LidarConfig) -> KISSConfig:
-    kiss = KISSConfig()
-    kiss.data.deskew = False  # done here
-    kiss.data.min_range, kiss.data.max_range = config.min_range, config.max_range
-    kiss.mapping.voxel_size = config.voxel_size
-    kiss.registration.max_num_iterations = config.max_iterations
-    kiss.registration.max_num_threads = THREADS
-    kiss.adaptive_threshold.initial_threshold = config.initial_threshold
-    kiss.adaptive_threshold.min_motion_th = config.min_motion
-    return kiss

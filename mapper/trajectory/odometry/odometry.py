@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
-import gtsam
 import numpy as np
 
 from ....datasets.frame import Frame
-from ...config import OdometryConfig
-from ..rigid import inverse, nearest_rigid, rotation_angle
+from ..rigid import inverse, pose_covariance, retracted, rotation_angle, tangent
 
 
 class TrackingOutcome(Enum):
@@ -56,9 +54,8 @@ def weighed(T: np.ndarray, information: np.ndarray, T_other: np.ndarray, informa
 
     d = Log(T^-1 T_other),     T Exp((Lambda + W)^-1 W d)
     """
-    d = gtsam.Pose3.Logmap(gtsam.Pose3(nearest_rigid(T)).between(gtsam.Pose3(nearest_rigid(T_other))))
-    x = np.linalg.solve(information + information_other, information_other @ d)
-    return nearest_rigid(T @ gtsam.Pose3.Expmap(x).matrix())
+    d = tangent(T, T_other)
+    return retracted(T, np.linalg.solve(information + information_other, information_other @ d))
 
 
 def widened(
@@ -71,7 +68,7 @@ def widened(
         T_other, covariance_other: the one that is relied on.
         gate: chi-square of 6 degrees of freedom, up to which the two agree and nothing is changed.
     """
-    d = gtsam.Pose3.Logmap(gtsam.Pose3(nearest_rigid(T)).between(gtsam.Pose3(nearest_rigid(T_other))))
+    d = tangent(T, T_other)
     agree = d @ np.linalg.solve(covariance + covariance_other, d) <= gate
     return covariance if agree else covariance + np.outer(d, d)
 
@@ -93,10 +90,15 @@ class Odometry(Protocol):
 
 
 class KeyframeSteps:
-    """From poses of keyframes to the motion between them, with a covariance that grows with it."""
+    """From poses of keyframes to the motion between them, with a covariance that grows with it.
 
-    def __init__(self, config: OdometryConfig) -> None:
-        self._config = config
+    Args:
+        floor: (rad, m) deviation of the shortest step.
+        drift: its growth, rad per rad turned and m per m moved.
+    """
+
+    def __init__(self, floor: tuple[float, float], drift: tuple[float, float]) -> None:
+        self._floor, self._drift = floor, drift
         self._T_last: np.ndarray | None = None
 
     def step(self, T: np.ndarray, covariance: np.ndarray) -> OdometryStep | None:
@@ -106,6 +108,5 @@ class KeyframeSteps:
             return None
         T_a_b = inverse(previous) @ T
         turned, moved = rotation_angle(T_a_b[:3, :3]), float(np.linalg.norm(T_a_b[:3, 3]))
-        (floor_r, floor_t), (drift_r, drift_t) = self._config.covariance_floor, self._config.drift
-        sigmas = np.repeat([np.hypot(floor_r, drift_r * turned), np.hypot(floor_t, drift_t * moved)], 3)
-        return OdometryStep(T_a_b, covariance + np.diag(sigmas**2))
+        turn, move = np.hypot(self._floor, np.multiply(self._drift, (turned, moved)))
+        return OdometryStep(T_a_b, covariance + pose_covariance((turn, move)))

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from ...config import VisualConfig
-from ..rigid import rigid_motion
+from ..rigid import pose_covariance, rigid_motion
 from .features import Features
 
 SAMPLES = 300  # RANSAC hypotheses of three pairs: 99.9 % sure to hit at 30 % inliers
@@ -108,7 +108,7 @@ def _covariance(T_a_b: np.ndarray, source: np.ndarray, target: np.ndarray, floor
     residual = source @ T_a_b[:3, :3].T + T_a_b[:3, 3] - target
     variance = float(weights @ (residual**2).sum(axis=1)) / max(3 * len(source) - 6, 1)
     information = np.einsum("n,nki,nkj->ij", weights, J, J) / max(variance, 1e-12)
-    return np.linalg.inv(information + 1e-6 * np.eye(6)) + np.diag(np.repeat(np.square(floor), 3))
+    return np.linalg.inv(information + 1e-6 * np.eye(6)) + pose_covariance(floor)
 
 
 def _weights(target: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ import numpy as np
 from ....factors.plane_information import point_to_plane_covariance
 from ...config import HybridConfig
 from ..rgbd_view import RgbdView
-from ..rigid import inverse, nearest_rigid, rotation_angle
+from ..rigid import inverse, nearest_rigid, pose_covariance, rotation_angle
 from .feature_motion import RelativePose
 from .image_information import ImageInformation, image_information
 
@@ -48,8 +48,8 @@ def hybrid_motion(
 
     Returns:
         None where too few pixels agree in depth, or all of them do not in brightness (bare walls look alike), or the
-        motion is too far from the guess. Where neither depth nor brightness
-        holds a direction there is an answer, whose covariance says so.
+        motion is too far from the guess. Where neither depth nor brightness holds a direction there is an answer, whose
+        covariance says so.
 
     Raises:
         HybridUnavailable: whatever the views.
@@ -114,10 +114,10 @@ def _covariance(
         H_depth = planes.information * planes.residual_sigma_m**2 * len(points_b) / planes.pairs
         H += H_depth
         noise += planes.residual_sigma_m**2 * max(len(points_b) / config.samples[1], 1.0) * H_depth
-    guess = np.diag(np.repeat(np.square(config.guess_sigma), 3) ** -1)
+    guess = np.linalg.inv(pose_covariance(config.guess_sigma))
     some_noise = noise + (TINY * np.trace(noise) + TINY) * np.eye(6)
     covariance = np.linalg.inv(H @ np.linalg.solve(some_noise, H) + guess)
-    return covariance + np.diag(np.repeat(np.square(config.covariance_floor), 3))
+    return covariance + pose_covariance(config.covariance_floor)
 
 
 def _open3d() -> ModuleType:
