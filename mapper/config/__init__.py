@@ -8,7 +8,7 @@ from __future__ import annotations
 from .back_end import CorrectionConfig, LifecycleConfig, SmootherConfig
 from .batch import BatchConfig, ScorePotential
 from .evidence import BeliefConfig, EvidenceConfig, PresenceConfig
-from .keyframes import HybridConfig, KeyframeConfig, ScanConfig, VisualConfig
+from .keyframes import HybridConfig, KeyframeConfig, ScanConfig, SparseConfig, VisualConfig
 from .loops import ConstellationConfig, LoopConfig, PlaceConfig
 from .mapper import CloudConfig, MapperConfig
 from .odometry import FlowConfig, GicpConfig, LidarConfig, OdometryConfig, OdometrySource
@@ -38,6 +38,7 @@ __all__ = [
     "ScanConfig",
     "ScorePotential",
     "SmootherConfig",
+    "SparseConfig",
     "TrackConfig",
     "UpConfig",
     "VisualConfig",

@@ -36,6 +36,20 @@ class VisualConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class SparseConfig:
+    """Frames far apart in time, such as keyframes that another system chose; measured on 58 of TUM's fr3_cabinet."""
+
+    interval: float = 0.2  # s between frames, in the median of the last `intervals`, from which they are far apart
+    intervals: int = 5
+    memory: int = 60  # values: a comparison gives up to three
+    limit: tuple[float, float] = (0.03, 0.03)  # rad, m: deviation claimed along a direction, above which it is open
+    prior: tuple[float, float] = (0.015, 0.02)  # rad, m: what links lack before anything is compared
+    step_factor: float = 4.0  # of what links lack, in steps: there up to 0.15 rad and 0.16 m
+    doubtful: float = 0.006  # rad that links lack, below which they are believed: rendered ones up to 0.004
+    neighbours: int = 6  # keyframes back that features are matched with if not, instead of `visual.neighbours`
+
+
+@dataclass(frozen=True, slots=True)
 class ScanConfig:
     """Matching the depth of two keyframes by GICP; measured on rendered hand-held sequences and redkitchen."""
 

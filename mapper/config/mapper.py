@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from .back_end import CorrectionConfig, LifecycleConfig, SmootherConfig
 from .batch import BatchConfig
 from .evidence import BeliefConfig, EvidenceConfig
-from .keyframes import HybridConfig, KeyframeConfig, ScanConfig, VisualConfig
+from .keyframes import HybridConfig, KeyframeConfig, ScanConfig, SparseConfig, VisualConfig
 from .loops import ConstellationConfig, LoopConfig, PlaceConfig
 from .odometry import OdometryConfig
 from .views import AssociationConfig, LiftingConfig, TrackConfig, UpConfig
@@ -31,6 +31,7 @@ class MapperConfig:
     odometry: OdometryConfig = field(default_factory=OdometryConfig)
     visual: VisualConfig = field(default_factory=VisualConfig)
     scans: ScanConfig = field(default_factory=ScanConfig)
+    sparse: SparseConfig = field(default_factory=SparseConfig)
     hybrid: HybridConfig = field(default_factory=HybridConfig)
     keyframes: KeyframeConfig = field(default_factory=KeyframeConfig)
     loops: LoopConfig = field(default_factory=LoopConfig)

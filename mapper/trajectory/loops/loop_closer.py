@@ -24,6 +24,7 @@ from ...estimation.smoother import Smoother
 from ..constellation.candidates import LoopCandidate
 from ..known_place import is_wide
 from ..rigid import inverse, pose_covariance, tangent
+from ..sparse_frames import SparseFrames
 from ..visual.features import Features
 from .link_jobs import Candidate, LinkConfig, LinkFound, LinkJob, LinkKind, find_links
 from .places import Place, Places
@@ -41,10 +42,11 @@ class LoopCloser:
     Args:
         config: of the whole mapper.
         smoother: whose keyframes are linked.
+        sparse: what links lack where frames are far apart.
     """
 
-    def __init__(self, config: MapperConfig, smoother: Smoother) -> None:
-        self._config, self._smoother = config.loops, smoother
+    def __init__(self, config: MapperConfig, smoother: Smoother, sparse: SparseFrames) -> None:
+        self._config, self._smoother, self._sparse = config.loops, smoother, sparse
         self._spacing = config.scans.spacing
         self._places = Places(config.loops, config.places)
         features = replace(config.visual, min_inliers=config.loops.min_inliers)
@@ -170,7 +172,8 @@ class LoopCloser:
         poses = self._smoother.poses() if links else np.empty((0, 4, 4))
         # before any enters: the first of several would make the others look too far off
         known = {b: self._smoother.path_covariances(b) for b in {link.b for link in links}}
-        for link in links:
+        missing = self._sparse.missing()
+        for link in (_widened(link, missing) for link in links):
             if adrift and link.kind is LinkKind.ALIKE:
                 closed |= self._add(link, agrees=True)
             elif is_wide(known[link.b][link.a]):
@@ -211,6 +214,11 @@ class LoopCloser:
         off = tangent(link.motion.T_a_b, inverse(poses[link.a]) @ poses[link.b])
         covariance = known + link.motion.covariance + pose_covariance(self._config.gate_floor)
         return bool(off @ np.linalg.solve(covariance, off) < self._config.gate)
+
+
+def _widened(link: LinkFound, missing: np.ndarray) -> LinkFound:
+    """With (6, 6) added to its covariance."""
+    return replace(link, motion=replace(link.motion, covariance=link.motion.covariance + missing))
 
 
 def _loosened(motion: Link) -> Link:

@@ -25,14 +25,20 @@ class VisualEdge:
 class VisualOdometry:
     """Remembers the features of the last keyframes; measures the next one against them."""
 
-    def __init__(self, config: VisualConfig, seed: int) -> None:
+    def __init__(self, config: VisualConfig, seed: int, most: int = 0) -> None:
         self._config, self._seed = config, seed
-        self._recent: deque[tuple[int, Features]] = deque(maxlen=config.neighbours)
+        self._recent: deque[tuple[int, Features]] = deque(maxlen=max(config.neighbours, most))
 
-    def edges(self, features: Features) -> list[VisualEdge]:
-        """Motions from the last keyframes to a frame; fewer, or none, where too little matches."""
+    def edges(self, features: Features, neighbours: int | None = None) -> list[VisualEdge]:
+        """Motions from the last keyframes to a frame; fewer, or none, where too little matches.
+
+        Args:
+            features: of the frame.
+            neighbours: keyframes back; None for the configured number.
+        """
+        count = self._config.neighbours if neighbours is None else neighbours
         edges = []
-        for number, old in self._recent:
+        for number, old in list(self._recent)[-count:]:
             motion = relative_pose(old, features, self._config, self._seed)
             if motion is not None:
                 edges.append(VisualEdge(number, motion))

@@ -9,10 +9,11 @@ import gtsam
 import numpy as np
 
 from thingmap.datasets.frame import Intrinsics
-from thingmap.mapper.config import LoopConfig, MapperConfig, SmootherConfig
+from thingmap.mapper.config import LoopConfig, MapperConfig, SmootherConfig, SparseConfig
 from thingmap.mapper.estimation.ledger import Ledger
 from thingmap.mapper.estimation.smoother import Smoother
 from thingmap.mapper.trajectory.loops.loop_closer import LoopCloser
+from thingmap.mapper.trajectory.sparse_frames import SparseFrames
 from thingmap.mapper.trajectory.visual.features import Features
 
 CAMERA = Intrinsics(96, 72, 78.0, 78.0, 47.5, 35.5)
@@ -76,7 +77,7 @@ class Walk:
 
     def __init__(self, loops: LoopConfig = SHORT, start: np.ndarray | None = None) -> None:
         self.smoother = Smoother(SmootherConfig(), CAMERA)
-        self.closer = LoopCloser(replace(MapperConfig(), loops=loops), self.smoother)
+        self.closer = LoopCloser(replace(MapperConfig(), loops=loops), self.smoother, SparseFrames(SparseConfig()))
         self.truth: list[np.ndarray] = [pose() if start is None else start]
         self.closed: list[int] = []  # keyframes with which a loop was closed
         self.smoother.add_first(self.truth[0], np.repeat([1e-3, 1e-3], 3), np.array([0.0, -1.0, 0.0]), 0.6)
