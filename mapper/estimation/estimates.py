@@ -20,16 +20,25 @@ class Estimates:
 
     _graph: IncrementalGraph
     keyframes: int
-    _joint: JointMarginals | None = None  # of the graph as it is; whoever changes the graph forgets it
+    # of the graph as it is; whoever changes the graph forgets them
+    _joint: JointMarginals | None = None
+    _poses: np.ndarray | None = None
 
     def pose(self, keyframe: int) -> np.ndarray:
         """(4, 4) `T_world_camera` of a keyframe."""
         return self._graph.isam.calculateEstimatePose3(X(keyframe)).matrix()
 
     def poses(self) -> np.ndarray:
-        """(M, 4, 4) `T_world_camera` of all keyframes."""
-        estimate = self._graph.isam.calculateEstimate()
-        return np.array([estimate.atPose3(X(t)).matrix() for t in range(self.keyframes)])
+        """(M, 4, 4) `T_world_camera` of all keyframes, read-only: they are read from the graph once an update."""
+        if self._poses is None or len(self._poses) != self.keyframes:
+            estimate = self._graph.isam.calculateEstimate()
+            self._poses = np.array([estimate.atPose3(X(t)).matrix() for t in range(self.keyframes)])
+            self._poses.flags.writeable = False
+        return self._poses
+
+    def _forget(self) -> None:
+        """To be called when the graph has changed."""
+        self._joint = self._poses = None
 
     def pose_covariances(self) -> np.ndarray:
         """(M, 6, 6) covariances of all keyframe poses, each in its pose's right tangent [rad, m]."""

@@ -62,7 +62,7 @@ class LedgerGraph(Estimates):
 
         An indeterminate system destroys ISAM2: then it is rebuilt from the ledger.
         """
-        self._joint = None
+        self._forget()
         try:
             self._graph.solve()
             if self._loops_changed:
@@ -101,7 +101,7 @@ class LedgerGraph(Estimates):
     def _rebuild(self, start: gtsam.Values | None = None) -> None:
         """A fresh ISAM2 from the ledger, from the values in `start` and else from the last good estimate."""
         self.rebuilds += 1
-        self._joint = None
+        self._forget()
         sources = start or gtsam.Values(), current_values(self._graph), self._snapshot, self._graph.values
         start = start_values(sources, self.ledger, self._live, self._frozen)
         self.R_world_upright = upright_rotation(start.atUnit3(UP).point3())

@@ -83,7 +83,7 @@ def test_what_drift_explains_is_not_told_apart(tools):
 def test_a_loop_is_obeyed_within_its_covariance(tools):
     table = Table(tools)
     loop = table.close()
-    poses = table.smoother.poses()
+    poses = table.smoother.poses().copy()
     assert not disobeys(loop, poses)
     poses[loop.b, 0, 3] += 0.1
     assert disobeys(loop, poses)
