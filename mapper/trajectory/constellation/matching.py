@@ -23,7 +23,7 @@ from ...config import ConstellationConfig
 from ...map.upright import upright_rotation
 from .fit import Drift, fit_corrections, log_density
 from .graph import consistent_pairs, edges_with_bounds
-from .pairs import Constellation, centre_noise, compatible_pairs, spread_volume
+from .pairs import Constellation, centre_noise, compatible_pairs, in_order_of_size, spread_volume
 from .search import grow_sets
 
 HOPELESS = -10.0  # nats of evidence below which a correction is not worth the search
@@ -74,6 +74,8 @@ def match_constellations(
     """
     if min(len(recent), len(old)) < max(config.min_matches, 2):
         return []
+    # the search stops at the first answers that are good enough: which these are must not hang on the things' order
+    (recent, i), (old, j) = in_order_of_size(recent), in_order_of_size(old)
     U = upright_rotation(up)
     places = recent.positions @ U, old.positions @ U
     noise = centre_noise(recent, U, config), centre_noise(old, U, config)
@@ -101,7 +103,7 @@ def match_constellations(
     return [
         ConstellationMatch(
             world @ fit.T[s] @ world.T,
-            tuple((int(i), int(partners[s, i])) for i in np.flatnonzero(matched[s])),
+            tuple(sorted((int(i[k]), int(j[partners[s, k]])) for k in np.flatnonzero(matched[s]))),
             float(evidence[s]),
             float(log_odds),
             int(missed[s].sum()),

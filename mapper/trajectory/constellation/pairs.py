@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -31,6 +31,13 @@ class Constellation:
 
     def __len__(self) -> int:
         return len(self.numbers)
+
+
+def in_order_of_size(things: Constellation) -> tuple[Constellation, np.ndarray]:
+    """The things in an order that neither their numbering nor the axes of the world decide, and (N,) where each was."""
+    order = np.lexsort(things.log_sizes.T)
+    arrays = (getattr(things, field.name)[order] for field in fields(things))
+    return Constellation(*arrays), order
 
 
 def centre_noise(things: Constellation, U: np.ndarray, config: ConstellationConfig) -> np.ndarray:

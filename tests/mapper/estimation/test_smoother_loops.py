@@ -89,6 +89,7 @@ def assert_alike(a: Smoother, b: Smoother, atol: float) -> None:
 def converge(smoother: Smoother) -> Smoother:
     """Beyond the thresholds, as a closed loop is."""
     assert smoother._graph.converge(30, 1e-4)
+    smoother._forget()
     return smoother
 
 
