@@ -1,0 +1,1 @@
+"""Views of single objects, and backgrounds without them: what detectors are trained from."""
