@@ -1,13 +1,17 @@
 """Detectors by a line of text, as the command line and configuration files name them.
 
     onnx:PATH       names=FILE confidence=0.1 nms=0.5 max=100 backend=opencv size=640x480 family=yolox-decoded
+    hog[:PATH]      confidence=0.1 nms=0.4 max=100 parts=0 merge=0
+    proposals       confidence=0.3 max=100 edge=1
     recorded:PATH   format=coco names=FILE label=cabinet images=FILE
     simulated       seed=1 parts=1 max_recall=0.96 background_spots=5 chance_rate=0.12 ...
     none
 
-Options follow a question mark: `onnx:model.onnx?confidence=0.2&backend=opencv`. `OnnxDetector` and
-`RecordedDetections` explain them; those of `simulated` are the seed and the numbers of `SimulatedDetectorConfig`.
-A path alone is `onnx:` when it ends in .onnx, and `recorded:` when it is a .json file or a folder.
+Options follow a question mark: `onnx:model.onnx?confidence=0.2&backend=opencv`. `OnnxDetector`, `HogDetector`,
+`ProposalDetector` and `RecordedDetections` explain them; those of `simulated` are the seed and the numbers of
+`SimulatedDetectorConfig`.
+`hog` alone is the shipped model of the synthetic world's things. A path alone is `onnx:` when it ends in .onnx, `hog:`
+when it ends in .npz, and `recorded:` when it is a .json file or a folder.
 """
 
 from __future__ import annotations
@@ -41,7 +45,7 @@ def make_detector(spec: str, sequence: Sequence | None = None) -> Detector:
     if kind is None:
         known = ", ".join(kind.usage for kind in _KINDS.values())
         raise UserError(f"detector {spec!r}: there is no {scheme!r}; there are {known}")
-    if bool(path) is not kind.needs_path:
+    if kind.needs_path is not None and bool(path) is not kind.needs_path:
         raise UserError(f"detector {spec!r}: {'give' if kind.needs_path else 'there is no'} path, as in {kind.usage}")
     options = {}
     for name, text in given.items():
@@ -75,6 +79,8 @@ def _scheme_of(path: str) -> str:
     """The kind of detector of a path alone; the path itself, which is none, where it shows none."""
     if path.lower().endswith(".onnx"):
         return "onnx"
+    if path.lower().endswith(".npz"):
+        return "hog"
     is_recorded = path.lower().endswith(".json") or (path != "" and Path(path).is_dir())
     return "recorded" if is_recorded else path
 
@@ -83,6 +89,18 @@ def _make_onnx(path: str, sequence: Sequence | None, options: dict[str, Any]) ->
     from .onnx import OnnxDetector
 
     return OnnxDetector(path, **options)
+
+
+def _make_hog(path: str, sequence: Sequence | None, options: dict[str, Any]) -> Detector:
+    from .hog.detector import HogDetector
+
+    return HogDetector(path or None, **options)
+
+
+def _make_proposals(path: str, sequence: Sequence | None, options: dict[str, Any]) -> Detector:
+    from .proposals.detector import ProposalDetector
+
+    return ProposalDetector(**options)
 
 
 def _make_recorded(path: str, sequence: Sequence | None, options: dict[str, Any]) -> Detector:
@@ -129,14 +147,22 @@ _MEANING = {int: "a whole number", float: "a number", _switch: "0 or 1", _size: 
 
 
 class _Kind(NamedTuple):
-    """One kind of detector; `options` gives for each name the keyword and how to read its text."""
+    """One kind of detector.
+
+    Attributes:
+        usage: how it is written.
+        needs_path: whether there has to be a path or must not be one; None where there may be.
+        make: the detector from path, sequence and options.
+        options: for each name the keyword, and how to read its text.
+    """
 
     usage: str
-    needs_path: bool
+    needs_path: bool | None
     make: Callable[[str, Sequence | None, dict[str, Any]], Detector]
     options: dict[str, tuple[str, Callable[[str], Any]]]
 
 
+_BOXES_KEPT = {"confidence": ("confidence", float), "nms": ("nms_iou", float), "max": ("max_detections", int)}
 _KINDS = {
     "onnx": _Kind(
         "onnx:PATH",
@@ -144,13 +170,23 @@ _KINDS = {
         _make_onnx,
         {
             "names": ("classes", str),
-            "confidence": ("confidence", float),
-            "nms": ("nms_iou", float),
-            "max": ("max_detections", int),
+            **_BOXES_KEPT,
             "backend": ("backend", str),
             "size": ("input_size", _size),
             "family": ("family", str),
         },
+    ),
+    "hog": _Kind(
+        "hog[:PATH]",
+        None,
+        _make_hog,
+        {**_BOXES_KEPT, "parts": ("parts", _switch), "merge": ("merge", _switch)},
+    ),
+    "proposals": _Kind(
+        "proposals",
+        False,
+        _make_proposals,
+        {"confidence": ("confidence", float), "max": ("max_detections", int), "edge": ("edge", _switch)},
     ),
     "recorded": _Kind(
         "recorded:PATH",

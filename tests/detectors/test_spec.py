@@ -12,9 +12,14 @@ import pytest
 
 from thingmap.datasets.errors import InputError, UserError
 from thingmap.datasets.views import subset
-from thingmap.detectors.detections import Detections
+from thingmap.detectors.detections import Detections, Part
+from thingmap.detectors.hog.channels import Channels
+from thingmap.detectors.hog.config import PyramidConfig
+from thingmap.detectors.hog.detector import HogDetector
+from thingmap.detectors.hog.model import HogModel, HogTemplate
 from thingmap.detectors.onnx import OnnxDetector
 from thingmap.detectors.onnx.outputs import OutputFamily
+from thingmap.detectors.proposals.detector import ProposalDetector
 from thingmap.detectors.recorded import RecordedDetections, RecordedFormat, write_detections
 from thingmap.detectors.simulated_config import SimulatedDetectorConfig
 from thingmap.detectors.spec import make_detector
@@ -35,6 +40,44 @@ def test_onnx_with_options(model: Path):
     assert make_detector(f"{model}?names={model.parent / 'names.txt'}&size=64&family=yolov8").family == (  # type: ignore[attr-defined]
         OutputFamily.YOLOV8.value
     )
+
+
+@pytest.fixture
+def hog_model(tmp_path: Path) -> Path:
+    whole, top = (
+        HogTemplate(0, part, np.zeros((3, 3, 31)), 0.0, -9.0, (-1.0, 0.0), (0.0, 0.0, 1.0, 1.0))
+        for part in (Part.WHOLE, Part.TOP)
+    )
+    HogModel(("mug",), Channels.RGB, (whole, top), PyramidConfig(), {}).save(tmp_path / "mugs.npz")
+    return tmp_path / "mugs.npz"
+
+
+def test_hog_with_options(hog_model: Path, make_frame):
+    detector = make_detector(f"hog:{hog_model}?confidence=0.3&nms=0.6&max=7&parts=0&merge=0")
+    assert isinstance(detector, HogDetector) and detector.classes == ("mug",)
+    assert (detector.confidence, detector.nms_iou, detector.max_detections) == (0.3, 0.6, 7)
+    assert not detector.parts and not detector.merge
+    assert len(detector(make_frame())) == 0
+    by_path = make_detector(str(hog_model))
+    assert isinstance(by_path, HogDetector) and by_path.parts
+    with pytest.raises(UserError, match=r"nms_iou must be in \[0, 1\], but is 2.0"):
+        make_detector(f"{hog_model}?nms=2")
+
+
+def test_hog_alone_is_the_shipped_model(hog_model: Path, monkeypatch):
+    monkeypatch.setattr("thingmap.detectors.hog.detector.shipped_model", lambda: hog_model)
+    for spec in ("hog", "hog:", "hog?confidence=0.2"):
+        detector = make_detector(spec)
+        assert isinstance(detector, HogDetector) and detector.classes == ("mug",)
+
+
+def test_proposals_with_options(make_frame):
+    detector = make_detector("proposals?confidence=0.4&max=7&edge=0")
+    assert isinstance(detector, ProposalDetector) and detector.classes == ("unknown",)
+    assert (detector.confidence, detector.max_detections, detector.edge) == (0.4, 7, False)
+    assert len(detector(make_frame())) == 0
+    with pytest.raises(UserError, match=r"confidence must be in \[0, 1\], but is 2.0"):
+        make_detector("proposals?confidence=2")
 
 
 def test_recorded(tmp_path: Path, make_frame):
@@ -106,7 +149,7 @@ def test_none(make_frame):
 @pytest.mark.parametrize(
     ("spec", "message"),
     [
-        ("yolo:a.pt", "there is no 'yolo'; there are onnx:PATH, recorded:PATH, simulated, none"),
+        ("yolo:a.pt", "there is no 'yolo'; there are onnx:PATH, hog\\[:PATH\\], proposals, recorded:PATH, simulated, none"),
         ("a.pt", "there is no 'a.pt'; there are"),
         ("", "there is no ''; there are"),
         ("onnx", "give path, as in onnx:PATH"),
@@ -114,6 +157,10 @@ def test_none(make_frame):
         ("none:a", "there is no path, as in none"),
         ("onnx:a.onnx?conf=0.1", "there is no option 'conf'; onnx has names, confidence, nms"),
         ("none?seed=1", "there is no option 'seed'; none has none"),
+        ("hog?names=a.txt", "there is no option 'names'; hog has confidence, nms, max, parts, merge"),
+        ("hog?parts=yes", "parts=yes is not 0 or 1"),
+        ("proposals?nms=0.1", "there is no option 'nms'; proposals has confidence, max, edge"),
+        ("proposals:a", "there is no path, as in proposals"),
         ("onnx:a.onnx?confidence=high", "confidence=high is not a number"),
         ("onnx:a.onnx?size=wide", "size=wide is not a size such as 640x480"),
         ("simulated?seed=x", "seed=x is not a whole number"),
@@ -128,6 +175,7 @@ def test_lines_that_say_nothing_known(spec: str, message: str):
 
 
 def test_files_that_are_not_there(tmp_path: Path):
-    for spec in (f"onnx:{tmp_path}/a.onnx", f"{tmp_path}/a.onnx", f"recorded:{tmp_path}/a", f"{tmp_path}/a.json"):
+    onnx, hog = (f"onnx:{tmp_path}/a.onnx", f"{tmp_path}/a.onnx"), (f"hog:{tmp_path}/a.npz", f"{tmp_path}/a.npz")
+    for spec in (*onnx, *hog, f"recorded:{tmp_path}/a", f"{tmp_path}/a.json"):
         with pytest.raises(InputError, match="no such file"):
             make_detector(spec)
