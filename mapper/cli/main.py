@@ -21,6 +21,7 @@ from .learn import learn
 from .query import query
 from .run import run
 from .synth import synth
+from .train import train
 
 # What the parser raises for a bad option; typer carries its own copy of click since 0.26 and shows only this subclass.
 UsageProblem: type[Exception] = next(cls for cls in typer.BadParameter.__mro__ if cls.__name__ == "ClickException")
@@ -77,6 +78,7 @@ app = typer.Typer(
 )
 for command in (run, detect, query, export, info, evaluate, compare, synth, learn):
     app.command()(command)
+app.add_typer(train, name="train")
 
 
 def _show_version(wanted: bool) -> None:
