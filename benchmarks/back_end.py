@@ -18,8 +18,8 @@ from back_end_world import KINECT, UP, World, clip
 
 from thingmap.datasets.frame import Frame
 from thingmap.factors.evidence_model import generic_evidence_model
+from thingmap.factors.solid import project_solids
 from thingmap.factors.visibility import Visibility, VolumePart
-from thingmap.factors.volume import project_volumes
 from thingmap.mapper.config import MapperConfig
 from thingmap.mapper.estimation.association import Assignment, Targets
 from thingmap.mapper.estimation.beliefs import Belief
@@ -131,7 +131,7 @@ class BackEnd:
         positions = np.array([m.position for m in members]).reshape(-1, 3)
         log_sizes = np.array([m.log_size for m in members]).reshape(-1, 3)
         covariances = np.array([m.covariance for m in members]).reshape(-1, 3, 3)
-        xyxy, _ = project_volumes(view.T_world_camera, view.R_world_upright, positions, log_sizes, KINECT)
+        xyxy, _ = project_solids(view.T_world_camera, view.R_world_upright, positions, log_sizes, KINECT)
         occluded, in_image, free = simulated.occluded[own], simulated.in_image[own], self.world.free[own]
         shares = {
             "occluded": occluded,

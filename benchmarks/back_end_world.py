@@ -14,7 +14,7 @@ import numpy as np
 from thingmap.datasets.errors import UserError
 from thingmap.datasets.frame import Intrinsics
 from thingmap.factors.size_prior import ClassSizePriors, load_size_priors
-from thingmap.factors.volume import project_volumes
+from thingmap.factors.solid import project_solids
 from thingmap.mapper.config import LiftingConfig
 
 CLASSES = (
@@ -69,7 +69,7 @@ class World:
 
     def view(self, T_world_camera: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(N, 4) boxes of the whole things, pixels, and the (N,) share of each box that is in the image."""
-        xyxy, in_front = project_volumes(T_world_camera, np.eye(3), self.positions, self.log_sizes, KINECT)
+        xyxy, in_front = project_solids(T_world_camera, np.eye(3), self.positions, self.log_sizes, KINECT)
         z = (self.positions - T_world_camera[:3, 3]) @ T_world_camera[:3, 2]
         near = in_front & (z > RANGE[0]) & (z < RANGE[1])
         xyxy[~near] = 0.0

@@ -1,8 +1,8 @@
 """A detected box against the projected volume.
 
 Meger et al. (Mobile 3D Object Detection in Clutter, section III-D; Explicit Occlusion, equation (4), Psi_g) score a
-hypothesis by a zero-mean Gaussian on the error of image centre and scale between the projected volume and its
-detection. Centre and scale are linear in the four sides, so the same Gaussian is written on the sides b:
+hypothesis by a zero-mean Gaussian on the error of image centre and scale between the projected volume (`solid.py`) and
+its detection. Centre and scale are linear in the four sides, so the same Gaussian is written on the sides b:
 
     r = b(X, L, S) - b_detected,      cost = rho_Huber(|r| / sigma_px)
 
@@ -26,8 +26,8 @@ from numba import njit
 
 from ..datasets.frame import Intrinsics
 from .robust import huber
+from .solid import solid_kernel
 from .visibility import VolumePart
-from .volume import project_kernel
 
 # By `VolumePart`: the side of a half's box that is the middle of the whole box; it lies opposite the side it replaces.
 MIDDLE_SIDE = (-1, 3, 1, 2, 0)
@@ -90,7 +90,7 @@ def box_alignment_factor(
 @njit(cache=True)
 def _residual(pose, R, center, log_half_axes, measured, seen, middle, focal, principal, residual, J, with_jacobian):
     """Fill residual (4,) in pixels and J (4, 12)."""
-    if not project_kernel(pose, R, center, log_half_axes, residual, J, with_jacobian):
+    if not solid_kernel(pose, R, center, log_half_axes, residual, J, with_jacobian):
         residual[:] = 0.0
         return
     if middle >= 0:  # A_part

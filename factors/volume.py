@@ -1,8 +1,10 @@
 """An upright ellipsoid seen by a camera: its image box, and how the box moves with pose, position and size.
 
-The volume of an object is the ellipsoid with centre c and half-axes a = exp(s) along the columns of `R_world_upright`.
-In the camera frame it has centre t = R_world_camera^T (c - p), axes A = R_world_camera^T R_world_upright and spread
-M = A diag(a^2) A^T. Its dual quadric, the set of planes that touch it, projects to the dual conic of its outline:
+What an object hides, and how far away its surface should be, is that of the ellipsoid inscribed in its extents; a
+detected box is compared with the fuller `solid.py`. The ellipsoid has its centre c and half-axes a = exp(s) along the
+columns of `R_world_upright`. In the camera frame it has centre t = R_world_camera^T (c - p), axes A = R_world_camera^T
+R_world_upright and spread M = A diag(a^2) A^T. Its dual quadric, the set of planes that touch it, projects to the dual
+conic of its outline:
 
     C = P Q* P^T = M - t t^T,      and a line l of the image touches the outline  <=>  l^T C l = 0.
 

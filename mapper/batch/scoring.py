@@ -27,8 +27,8 @@ from ...datasets.frame import Intrinsics
 from ...detectors.parts import part_box
 from ...factors.evidence_model import EvidenceModel
 from ...factors.size_prior import ClassSizePriors
+from ...factors.solid import project_solids
 from ...factors.visibility import Visibility, VolumePart, measure_visibility
-from ...factors.volume import project_volumes
 from ..config import AssociationConfig, EvidenceConfig, ScorePotential
 from ..estimation.association_costs import box_sides
 from ..estimation.lifting import LiftedDetection
@@ -91,7 +91,7 @@ class VolumeLikelihood:
         visibility = measure_visibility(view.frame.depth, k, *camera, volumes.position, volumes.log_size)
         if not self._config.occlusion:
             visibility = visibility.as_if_clear()
-        sides, _ = project_volumes(*camera, volumes.position, volumes.log_size, k)
+        sides, _ = project_solids(*camera, volumes.position, volumes.log_size, k)
         weights = template_weights(visibility.visible, self._views.templates)
         ratio = self._template_ratios(volumes, v, sides, visibility, k)
         told = weights.sum(axis=1) > 0.0

@@ -14,7 +14,7 @@ from numba import njit
 
 from ...datasets.frame import Intrinsics
 from ...factors.size_prior import ClassSizePriors
-from ...factors.volume import project_kernel
+from ...factors.solid import solid_kernel
 from ..proposals.views import PackedViews
 from ..proposals.volumes import Volumes
 
@@ -111,7 +111,7 @@ def _near_some_detection(T_rows, R, camera, found, may_be, gate, centres, log_si
             continue
         T = T_rows[v].T
         for n in range(len(centres)):
-            if near[n] or not project_kernel(T, R, centres[n], log_size, sides, unused, False):
+            if near[n] or not solid_kernel(T, R, centres[n], log_size, sides, unused, False):
                 continue
             for side in range(4):
                 sides[side] = camera[side % 2] * sides[side] + camera[2 + side % 2]

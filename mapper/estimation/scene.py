@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...factors.solid import project_solids
 from ...factors.visibility import Visibility, VolumePart, measure_visibility
-from ...factors.volume import project_volumes
 from ..config import AssociationConfig
 from .association import Targets
 from .landmarks import Landmark
@@ -44,7 +44,7 @@ class Scene:
         visibility = measure_visibility(view.frame.depth, k, *camera, positions, log_sizes)
         if not occlusion:
             visibility = visibility.as_if_clear()
-        xyxy, _ = project_volumes(*camera, positions, log_sizes, k)
+        xyxy, _ = project_solids(*camera, positions, log_sizes, k)
         clipped = np.clip(xyxy, -0.5, np.array([k.width, k.height, k.width, k.height]) - 0.5)
         parts = visibility.visible
         return Targets(positions, covariances, log_sizes, clipped, parts[:, WHOLE], parts, xyxy), visibility

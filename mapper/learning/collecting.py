@@ -17,8 +17,8 @@ from ...datasets.truth import TrueObject
 from ...detectors.detections import Detections, Part
 from ...detectors.detector import Detector
 from ...factors.size_table import plain_name
+from ...factors.solid import project_solids
 from ...factors.visibility import measure_visibility
-from ...factors.volume import project_volumes
 from ..read_ahead import ReadAhead
 from .config import LearningConfig
 from .known_scene import KnownScene
@@ -153,7 +153,7 @@ def _look(scene: KnownScene, frame: Frame, T_world_camera: np.ndarray, chosen: l
     camera = T_world_camera, scene.R_world_upright
     centers, log_half_axes = scene.centers[chosen], scene.log_half_axes[chosen]
     visibility = measure_visibility(frame.depth, frame.intrinsics, *camera, centers, log_half_axes)
-    whole, _ = project_volumes(*camera, centers, log_half_axes, frame.intrinsics)
+    whole, _ = project_solids(*camera, centers, log_half_axes, frame.intrinsics)
     size = np.array([frame.intrinsics.width, frame.intrinsics.height] * 2, dtype=np.float64)
     whole = np.clip(whole, -0.5, size - 0.5)
     side_px = np.sqrt(np.nan_to_num(whole[:, 2:] - whole[:, :2]).prod(axis=1))

@@ -18,7 +18,7 @@ import numpy as np
 from numba import njit
 
 from ...factors import box_alignment
-from ...factors.volume import project_kernel
+from ...factors.solid import solid_kernel
 
 HUBER = 1.345  # 95 % efficiency on Gaussian errors
 STEPS = 40  # at most
@@ -89,7 +89,7 @@ def energy(geometry, prior, chosen, x, H, g, with_derivatives):
             count += chosen[v, part] >= 0
         if count == 0:
             continue
-        if not project_kernel(T_rows[v].T, R, x[:3], x[3:], sides, J, with_derivatives):
+        if not solid_kernel(T_rows[v].T, R, x[:3], x[3:], sides, J, with_derivatives):
             return np.inf
         share = 1.0 / count
         for part in range(5):

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from ...factors.size_prior import ClassSizePriors
-from ...factors.volume import project_kernel
+from ...factors.solid import solid_kernel
 from ..config import AssociationConfig
 from .alignment import MIDDLE_SIDE, optimise
 from .views import PackedViews
@@ -114,7 +114,7 @@ def _associate(geometry, found, gates, class_id, x, chosen):
     for v in range(len(chosen)):
         if first[v] == first[v + 1]:
             continue
-        if not project_kernel(T_rows[v].T, R, x[:3], x[3:], sides, unused, False):
+        if not solid_kernel(T_rows[v].T, R, x[:3], x[3:], sides, unused, False):
             continue
         for side in range(4):
             sides[side] = camera[side % 2] * sides[side] + camera[2 + side % 2]

@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 
 from ...factors.size_prior import ClassSizePriors
-from ...factors.volume import project_kernel
+from ...factors.solid import solid_kernel
 from .views import PackedViews
 from .volumes import Volumes
 
@@ -122,7 +122,7 @@ def place(T, R, camera, box, z, sizes, chance, offset):
         for i in range(3):
             centres[m, i] = T[i, 3] + ray[i] * (z + offset * radius / length)
         log_weight[m] = -1e3
-        if project_kernel(T, R, centres[m], sizes[m], sides, unused, False):
+        if solid_kernel(T, R, centres[m], sizes[m], sides, unused, False):
             for side in range(4):
                 sides[side] = camera[side % 2] * sides[side] + camera[2 + side % 2]
             log_weight[m] = max(-1e3, -0.5 * _misfit(sides, box))

@@ -12,8 +12,8 @@ from thingmap.datasets.frame import Intrinsics
 from thingmap.factors.box_alignment import box_alignment_factor
 from thingmap.factors.guard import position_guard, size_guard
 from thingmap.factors.robust import HUBER_WIDTH
+from thingmap.factors.solid import project_solids
 from thingmap.factors.visibility import VolumePart
-from thingmap.factors.volume import project_volumes
 
 X, L, S = gtsam.symbol("x", 0), gtsam.symbol("l", 0), gtsam.symbol("s", 0)
 INTRINSICS = Intrinsics(640, 480, 500.0, 510.0, 319.5, 239.5)
@@ -32,7 +32,7 @@ def values_of(center, half_axes, pose=None) -> gtsam.Values:
 
 def predicted_box(values: gtsam.Values) -> np.ndarray:
     T, center, size = values.atPose3(X).matrix(), values.atPoint3(L), values.atVector(S)
-    return project_volumes(T, np.eye(3), center[None], size[None], INTRINSICS)[0][0]
+    return project_solids(T, np.eye(3), center[None], size[None], INTRINSICS)[0][0]
 
 
 def factor(xyxy, seen=ALL_SEEN, part=VolumePart.WHOLE) -> gtsam.CustomFactor:
@@ -111,7 +111,7 @@ def test_a_clipped_box_may_be_drawn_some_pixels_off_the_border():
     values = values_of([-1.30, 0.0, 2.0], [0.15, 0.1, 0.1])
     box = predicted_box(values)
     assert box[0] < -30.0 < box[2]
-    for drawn in (-60.0, -20.0, 0.0, 6.0):
+    for drawn in (-70.0, -20.0, 0.0, 6.0):
         clipped = np.array([drawn, *box[1:]])
         assert factor(clipped, np.array([False, True, True, True])).error(values) == pytest.approx(0.0, abs=1e-18)
         assert factor(clipped).error(values) > 1.0

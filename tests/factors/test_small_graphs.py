@@ -11,7 +11,7 @@ from thingmap.factors.box_alignment import box_alignment_factor
 from thingmap.factors.depth_centre import depth_centre_factor
 from thingmap.factors.guard import position_guard, size_guard
 from thingmap.factors.odometry import between_factor, gauge_prior
-from thingmap.factors.volume import project_volumes
+from thingmap.factors.solid import project_solids
 
 X0, X1, L, S = (gtsam.symbol(c, i) for c, i in (("x", 0), ("x", 1), ("l", 0), ("s", 0)))
 INTRINSICS = Intrinsics(640, 480, 525.0, 525.0, 319.5, 239.5)
@@ -25,15 +25,13 @@ def solve(factors, values: gtsam.Values) -> gtsam.Values:
     return gtsam.LevenbergMarquardtOptimizer(graph, values).optimize()
 
 
-def test_one_view_of_a_sphere_gives_its_radius():
-    """A sphere at distance d that spans half-width w (over f) has r = d w / sqrt(1 + w^2)."""
-    w, d = 50.0 / 525.0, 2.0
-    box = np.array([319.5 - 50.0, 239.5 - 50.0, 319.5 + 50.0, 239.5 + 50.0])
+def test_one_view_gives_position_and_size_where_the_depth_extent_is_known():
+    radius, d = 0.19, 2.0
+    box = project_solids(np.eye(4), np.eye(3), np.array([[0.0, 0.0, d]]), np.log([[radius] * 3]), INTRINSICS)[0][0]
     values = gtsam.Values()
     values.insert(X0, gtsam.Pose3())
     values.insertPoint3(L, np.array([0.1, 0.1, 1.7]))
     values.insert(S, np.log([0.1, 0.1, 0.1]))
-    radius = d * w / np.sqrt(1.0 + w * w)
     round_prior = gtsam.noiseModel.Diagonal.Sigmas([100.0, 100.0, 1e-6])  # one view cannot see the depth extent
     solution = solve(
         [
@@ -63,7 +61,7 @@ def test_two_views_give_position_and_all_three_sizes():
         size_guard(S, np.log([0.15, 0.15, 0.15])),
     ]
     for key, T in ((X0, T0), (X1, T1)):
-        box = project_volumes(T, R_upright, center[None], np.log(half_axes)[None], INTRINSICS)[0][0]
+        box = project_solids(T, R_upright, center[None], np.log(half_axes)[None], INTRINSICS)[0][0]
         seen_center = T[:3, :3].T @ (center - T[:3, 3])
         factors.append(depth_centre_factor(key, L, seen_center, 0.01, 0.03))
         factors.append(box_alignment_factor(key, L, S, box, ALL_SEEN, INTRINSICS, R_upright, 1.0))

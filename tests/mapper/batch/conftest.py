@@ -12,7 +12,7 @@ from thingmap.detectors.detections import Part
 from thingmap.detectors.parts import part_box, whole_box
 from thingmap.factors.evidence_model import EvidenceModel, generic_evidence_model
 from thingmap.factors.size_prior import ClassSizePriors, load_size_priors
-from thingmap.factors.volume import project_volumes
+from thingmap.factors.solid import project_solids
 from thingmap.mapper.config import MapperConfig
 from thingmap.mapper.estimation.lifting import LiftedDetection
 from thingmap.mapper.estimation.view import View
@@ -57,7 +57,7 @@ class Table:
     def detect(self, volume: int, camera: int, part: int = Part.WHOLE, shift: float | np.ndarray = 0.0) -> None:
         """Adds the exact detection of a volume, its sides moved by `shift` pixels."""
         T, (centre, log_size, k) = self.cameras[camera], self.volumes[volume]
-        box = project_volumes(T, UPRIGHT, centre[None], log_size[None], KINECT)[0][0]
+        box = project_solids(T, UPRIGHT, centre[None], log_size[None], KINECT)[0][0]
         xyxy = part_box(box, part) + shift
         scores = np.full(len(CLASSES), 0.02)
         scores[k] = 0.7

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from thingmap.detectors.detections import Part
-from thingmap.factors.volume import project_volumes
+from thingmap.factors.solid import project_solids
 from thingmap.mapper.batch.sliding import grid_centres, occupied_points, slide_volumes
 from thingmap.mapper.proposals.sampling import box_depths, class_shares, sample_volumes
 from thingmap.mapper.proposals.views import StoredView, spread_views
@@ -61,7 +61,7 @@ def test_sizes_agree_better_with_the_box_than_the_prior_alone(tools):
     box = table.detections[0][0].xyxy
 
     def misfit(log_size: np.ndarray) -> float:
-        got, _ = project_volumes(table.cameras[0], tools.upright, samples.position[mugs], log_size, tools.kinect)
+        got, _ = project_solids(table.cameras[0], tools.upright, samples.position[mugs], log_size, tools.kinect)
         return float(np.mean(np.abs(np.log((got[:, 2:] - got[:, :2]) / (box[2:] - box[:2])))))
 
     assert misfit(samples.log_size[mugs]) < 0.8 * misfit(prior)

@@ -17,7 +17,7 @@ from thingmap.factors.evidence_model import EvidenceModel, generic_evidence_mode
 from thingmap.factors.existence import ExistenceModel
 from thingmap.factors.odometry import pose3
 from thingmap.factors.size_prior import ClassSizePriors, load_size_priors
-from thingmap.factors.volume import project_volumes
+from thingmap.factors.solid import project_solids
 from thingmap.mapper.config import MapperConfig, SmootherConfig, TrackConfig
 from thingmap.mapper.estimation.association import associate
 from thingmap.mapper.estimation.evidence import Observer, class_evidence, score_evidence
@@ -113,7 +113,7 @@ class Room:
     def see_box(self, keyframe: int, number: int, sigma_px: float = 2.0, sides: np.ndarray | None = None) -> None:
         """The exact box, or one whose `sides` are off by (4,) pixels."""
         position, log_size = self.objects[number]
-        box = project_volumes(self.cameras[keyframe], np.eye(3), position[None], log_size[None], KINECT)[0][0]
+        box = project_solids(self.cameras[keyframe], np.eye(3), position[None], log_size[None], KINECT)[0][0]
         box = box if sides is None else box + sides
         self.smoother.add(Box(keyframe, number, box, np.ones(4, bool), sigma_px))
 
@@ -262,7 +262,7 @@ class Stage:
     @staticmethod
     def _box(T: np.ndarray, thing: Thing) -> np.ndarray:
         place, size = np.array([thing.position]), np.log([thing.half_axes])
-        return project_volumes(T, np.eye(3), place, size, KINECT)[0][0]
+        return project_solids(T, np.eye(3), place, size, KINECT)[0][0]
 
     def _depth(self, T: np.ndarray, things: Sequence[Thing]) -> np.ndarray:
         """(H, W) float32: a wall, and what stands before it, by the rays' quadratic."""

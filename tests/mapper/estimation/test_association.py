@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from thingmap.datasets.frame import Intrinsics
 from thingmap.factors.evidence_model import generic_evidence_model
 from thingmap.factors.score_model import ScoreModel
-from thingmap.factors.volume import project_volumes
+from thingmap.factors.solid import project_solids
 from thingmap.mapper.config import AssociationConfig
 from thingmap.mapper.estimation.association import Assignment, Targets, associate
 from thingmap.mapper.estimation.beliefs import Belief
@@ -42,7 +42,7 @@ def named_as(belief: Belief, model: ScoreModel, scores: np.ndarray, views: int) 
 
 def box_at(centre: ArrayLike, half_axes: ArrayLike = HALF_AXES, T: np.ndarray | None = None) -> np.ndarray:
     log_size = np.log(half_axes)[None]
-    return project_volumes(np.eye(4) if T is None else T, np.eye(3), np.array([centre]), log_size, KINECT)[0][0]
+    return project_solids(np.eye(4) if T is None else T, np.eye(3), np.array([centre]), log_size, KINECT)[0][0]
 
 
 def detection(

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from thingmap.datasets.frame import Intrinsics
 from thingmap.detectors.detections import Part
 from thingmap.detectors.parts import part_box, whole_box
-from thingmap.factors.volume import project_volumes
+from thingmap.factors.solid import project_solids
 from thingmap.mapper.config import AssociationConfig
 from thingmap.mapper.estimation.association import PART_VISIBLE, Assignment, Targets, associate
 from thingmap.mapper.estimation.lifting import LiftedDetection
@@ -27,7 +27,7 @@ NONE = [-1] * 5
 
 
 def box_at(centre: ArrayLike, half_axes: ArrayLike = SIZE) -> np.ndarray:
-    return project_volumes(np.eye(4), np.eye(3), np.array([centre]), np.log(half_axes)[None], KINECT)[0][0]
+    return project_solids(np.eye(4), np.eye(3), np.array([centre]), np.log(half_axes)[None], KINECT)[0][0]
 
 
 def seen(

@@ -9,7 +9,7 @@ from gtsam.symbol_shorthand import L, S, X
 
 from thingmap.datasets.frame import Intrinsics
 from thingmap.detectors.parts import part_box
-from thingmap.factors.volume import project_volumes
+from thingmap.factors.solid import project_solids
 from thingmap.mapper.config import SmootherConfig
 from thingmap.mapper.estimation.record_factors import UP, FactorContext, record_factors, site_factor
 from thingmap.mapper.estimation.records import (
@@ -85,7 +85,7 @@ def test_a_measurement_ties_the_landmark_that_its_own_was_merged_into():
 
 
 def test_exact_measurements_cost_nothing():
-    box = project_volumes(np.eye(4), R_LEANING, PLACE[None], LOG_SIZE[None], KINECT)[0][0]
+    box = project_solids(np.eye(4), R_LEANING, PLACE[None], LOG_SIZE[None], KINECT)[0][0]
     for record in (
         Gauge(np.eye(4), np.full(6, 0.01)),
         Motion(0, 1, np.eye(4), np.eye(6)),
@@ -100,7 +100,7 @@ def test_exact_measurements_cost_nothing():
 
 @pytest.mark.parametrize("part", range(1, 5))
 def test_the_box_of_a_half_is_compared_with_that_half(part):
-    whole = project_volumes(np.eye(4), R_LEANING, PLACE[None], LOG_SIZE[None], KINECT)[0][0]
+    whole = project_solids(np.eye(4), R_LEANING, PLACE[None], LOG_SIZE[None], KINECT)[0][0]
     half = part_box(whole, part)
     for named in range(5):
         (factor,) = record_factors(Box(0, 1, half, np.ones(4, bool), 2.0, named), context(R=R_LEANING))
@@ -108,7 +108,7 @@ def test_the_box_of_a_half_is_compared_with_that_half(part):
 
 
 def test_boxes_are_read_in_the_upright_frame():
-    box = project_volumes(np.eye(4), R_LEANING, PLACE[None], LOG_SIZE[None], KINECT)[0][0]
+    box = project_solids(np.eye(4), R_LEANING, PLACE[None], LOG_SIZE[None], KINECT)[0][0]
     (straight,) = record_factors(Box(0, 1, box, np.ones(4, bool), 2.0), context())
     assert straight.error(values()) > 0.3
 

@@ -9,7 +9,7 @@ from gtsam.symbol_shorthand import L, S, X
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thingmap.factors.volume import project_volumes
+from thingmap.factors.solid import project_solids
 from thingmap.mapper.config import SmootherConfig
 from thingmap.mapper.estimation.ledger import Ledger
 from thingmap.mapper.estimation.records import Box, DepthCentre, Up
@@ -101,7 +101,7 @@ def test_volumes_turn_with_up(tools):
     place, log_size = np.array([0.05, 0.0, 0.0]), np.log([0.06, 0.12, 0.3])
     smoother.add_landmark(1, place, log_size, SizeSite(log_size, 0.01 * np.eye(3)))
     for t, T in enumerate(cameras):
-        box = project_volumes(T, np.eye(3), place[None], log_size[None], tools.kinect)[0][0]
+        box = project_solids(T, np.eye(3), place[None], log_size[None], tools.kinect)[0][0]
         smoother.add(DepthCentre(t, 1, T[:3, :3].T @ (place - T[:3, 3]), 0.02, 0.02, 1.0))
         smoother.add(Box(t, 1, box, np.ones(4, bool), 1.0))
     smoother.update()
@@ -159,7 +159,7 @@ def test_a_saved_ledger_remembers_that_up_has_turned(tools, tmp_path):
         room.smoother.update()
     loaded = reload(room.smoother, tools, tmp_path)
     assert loaded.up()[0] == pytest.approx(lean, abs=0.01)
-    assert_alike(loaded, room.smoother, 1e-3)
+    assert_alike(loaded, room.smoother, 3e-3)
     np.testing.assert_allclose(loaded.R_world_upright, room.smoother.R_world_upright, atol=0.03)
 
 
