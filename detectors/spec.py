@@ -2,7 +2,7 @@
 
     onnx:PATH       names=FILE confidence=0.1 nms=0.5 max=100 backend=opencv size=640x480 family=yolox-decoded
     hog[:PATH]      confidence=0.1 nms=0.4 max=100 parts=0 merge=0
-    proposals       confidence=0.3 max=100 edge=1
+    proposals       confidence=0.5 max=100 edge=1
     recorded:PATH   format=coco names=FILE label=cabinet images=FILE
     simulated       seed=1 parts=1 max_recall=0.96 background_spots=5 chance_rate=0.12 ...
     none

@@ -149,7 +149,10 @@ def test_none(make_frame):
 @pytest.mark.parametrize(
     ("spec", "message"),
     [
-        ("yolo:a.pt", "there is no 'yolo'; there are onnx:PATH, hog\\[:PATH\\], proposals, recorded:PATH, simulated, none"),
+        (
+            "yolo:a.pt",
+            "there is no 'yolo'; there are onnx:PATH, hog\\[:PATH\\], proposals, recorded:PATH, simulated, none",
+        ),
         ("a.pt", "there is no 'a.pt'; there are"),
         ("", "there is no ''; there are"),
         ("onnx", "give path, as in onnx:PATH"),
