@@ -17,7 +17,7 @@ class TrainConfig:
         seed: of everything that is drawn.
         rounds: of mining, at most; a template for which a round finds nothing new is done (10: Lai et al., III-C).
         pyramid: levels on which templates are trained, and later run; up to twice the image's size, since a can across
-            the room is 20 pixels wide.
+            the room is 20 pixels wide. Three an octave: with four mean AP was the same, and detection takes a third more.
         cells: about so many cells of 8 x 8 pixels has the window of a whole object.
         margin: room around the object in its window, as a share of the window's side, on every side: outlines need
             both of their sides.
@@ -53,7 +53,7 @@ class TrainConfig:
     channels: Channels = Channels.RGBD
     seed: int = 0
     rounds: int = 10
-    pyramid: PyramidConfig = field(default_factory=lambda: PyramidConfig(max_scale=2.0))
+    pyramid: PyramidConfig = field(default_factory=lambda: PyramidConfig(levels_per_octave=3, max_scale=2.0))
     cells: int = 48
     margin: float = 0.08
     fit: float = 0.9
@@ -64,7 +64,7 @@ class TrainConfig:
     held_out: float = 0.2
     held_out_views: int = 60
     shift: float = 0.04
-    zoom: float = 0.1
+    zoom: float = 0.15
     composed_frames: int = 40
     other_views: int = 200
     random_windows: int = 10

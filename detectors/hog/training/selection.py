@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from ....datasets.object_views.object_view import ObjectViews, ViewEntry
 from .config import TrainConfig
 
 FEWEST_INSTANCES = 3  # from so many on, a class gives whole instances away; with two, half of what there is would go
+LARGEST_LOSS = 2.0  # times the share held out, that an instance may have of a class's views to be given away
 BLOCKS = 20  # of neighbouring views, kept or given away together: neighbours in a video are nearly the same view
 FEWEST_VIEWS = 5  # with fewer, a class gives none away
 
@@ -54,13 +56,18 @@ def select_views(views: ObjectViews, config: TrainConfig) -> Selection:
 def _given_away(
     entries: tuple[ViewEntry, ...], indices: list[int], share: float, rng: np.random.Generator
 ) -> tuple[set[int], int]:
-    """Views of one class that are held out, and the number of whole instances that they are."""
+    """Views of one class that are held out, and the number of whole instances that they are.
+
+    An instance that has a large part of the views stays: of one scan and two snapshots, the scan is learned from.
+    """
     if len(indices) < FEWEST_VIEWS:
         return set(), 0
     instances = list(dict.fromkeys(entries[index].instance for index in indices))
-    if len(instances) >= FEWEST_INSTANCES:
-        count = max(round(share * len(instances)), 1)
-        chosen = {instances[k] for k in rng.choice(len(instances), count, replace=False)}
+    sizes = Counter(entries[index].instance for index in indices)
+    small = [name for name in instances if sizes[name] <= LARGEST_LOSS * share * len(indices)]
+    if len(instances) >= FEWEST_INSTANCES and small:
+        count = min(max(round(share * len(instances)), 1), len(small))
+        chosen = {small[k] for k in rng.choice(len(small), count, replace=False)}
         return {index for index in indices if entries[index].instance in chosen}, count
     every = max(round(1.0 / share), 2)
     given: set[int] = set()

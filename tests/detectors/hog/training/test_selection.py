@@ -31,6 +31,13 @@ def test_whole_instances_are_held_out_where_there_are_enough():
     assert len(chosen.learned) + len(chosen.held_out) == len(source)
 
 
+def test_an_instance_with_most_of_the_views_is_not_given_away():
+    source = views(mug_1=90, mug_2=10, mug_3=10)
+    for seed in range(8):
+        chosen = select_views(source, TrainConfig(seed=seed))
+        assert chosen.instances == {"mug": 1} and len(chosen.held_out) == 10
+
+
 def test_few_views_are_learned_from_and_calibrated_with():
     chosen = select_views(views(mug_1=2), TrainConfig())
     assert chosen.learned == chosen.held_out == (0, 1)
