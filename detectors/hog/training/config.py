@@ -17,7 +17,8 @@ class TrainConfig:
         seed: of everything that is drawn.
         rounds: of mining, at most; a template for which a round finds nothing new is done (10: Lai et al., III-C).
         pyramid: levels on which templates are trained, and later run; up to twice the image's size, since a can across
-            the room is 20 pixels wide. Three an octave: with four mean AP was the same, and detection takes a third more.
+            the room is 20 pixels wide. Three an octave: with four mean AP was the same and detection takes a third
+            more.
         cells: about so many cells of 8 x 8 pixels has the window of a whole object.
         margin: room around the object in its window, as a share of the window's side, on every side: outlines need
             both of their sides.
