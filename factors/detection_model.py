@@ -99,7 +99,7 @@ class DetectionModel:
         """
         largest = self._mixed(self.visible[part].max() + self.side[part].max(), part, posterior)
         expected = self.probability(visible, side_px, part, posterior) / largest
-        return np.where(np.asarray(visible) < 1.0 - TRUNCATION, 0.0, expected)
+        return np.where(1.0 - np.asarray(visible) > TRUNCATION, 0.0, expected)
 
     def _mixed(self, logit: np.ndarray | float, part: int, posterior: np.ndarray | None) -> np.ndarray:
         pooled = expit(self.intercept[-1, part] + logit)

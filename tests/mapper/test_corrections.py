@@ -51,8 +51,7 @@ BOWL = Block("bowl", (0.0, -0.2), (0.15, 0.15, 0.07))
 TABLE = (CUP, CEREAL, BOOK, BOWL)
 FIRST, SECOND, THIRD = np.arange(-25.0, 25.0, 5.0), np.arange(22.0, -28.0, -5.0), np.arange(-20.0, 30.0, 5.0)
 JUMPS = {  # (3,) metres, camera axes; axis of the turn by 10 degrees, camera axes
-    "up": ([0.0, -0.3, 0.0], [0.0, 1.0, 0.3]),
-    "up and over": ([0.0, -0.3, 0.0], [1.0, 0.0, 0.0]),
+    "up": ([0.0, -0.3, 0.0], [0.0, -1.0, 0.3]),
     "up and to the left": ([-0.21, -0.21, 0.0], [0.0, -1.0, 0.0]),
     "up and away": ([0.0, -0.25, 0.16], [1.0, 0.0, 0.0]),
     "to the right": ([0.3, 0.0, 0.0], [0.0, 1.0, 0.0]),
@@ -286,7 +285,7 @@ def test_nothing_is_touched_as_long_as_nothing_moves():
 
 def test_things_by_themselves_may_tell_that_a_place_is_the_same():
     """Where the odometry admits it, four pairs of things that agree close the gap before any loop does."""
-    drive = mapped_twice("up and over")
+    drive = drive_across(1.0, 180.0)
     assert worst_pose(drive) < 0.03
     assert {x.number for x in drive.landmarks} == {1, 2, 3, 4}
     assert all(len(at(drive.landmarks, block)) == 1 for block in TABLE)
@@ -301,7 +300,7 @@ def sideways(yaw: float, bearing: float) -> tuple[list[float], list[float]]:
     return [0.3 * np.cos(a), 0.0, 0.3 * np.sin(a)], [0.0, yaw, 0.0]
 
 
-COLLISIONS = [(1.0, 45.0), (1.0, 270.0), (-1.0, 180.0), (-1.0, 225.0), (-1.0, 270.0)]  # a thing counts for another
+COLLISIONS = [(1.0, 45.0), (1.0, 315.0), (-1.0, 225.0), (1.0, 270.0)]  # a thing counts for another
 ACROSS = [(yaw, bearing) for yaw in (1.0, -1.0) for bearing in np.arange(0.0, 360.0, 45.0)]
 
 
@@ -333,7 +332,7 @@ def test_every_jump_across_the_table_ends_with_every_thing_once(yaw, bearing):
         assert CLASSES[int(np.argmax(x.belief.class_posterior()))] == block.label
 
 
-@pytest.mark.parametrize(("yaw", "bearing"), COLLISIONS[::2])
+@pytest.mark.parametrize(("yaw", "bearing"), COLLISIONS)
 def test_without_separation_a_thing_on_another_s_place_holds_the_poses(yaw, bearing, monkeypatch):
     drive = drive_across(yaw, bearing)
     monkeypatch.setattr(drive.mapper._lifecycle, "separate", lambda: False)
