@@ -29,6 +29,7 @@ from thingmap.detectors.hog.detector import HogDetector
 from thingmap.detectors.hog.model import HogModel, HogTemplate, load_model
 from thingmap.detectors.hog.pyramid import Pyramid, build_pyramid
 from thingmap.detectors.hog.scoring import Scorer
+from thingmap.mapper.evaluation.reporting.report import without_folders
 
 TITLE = "HOG detector, speed"
 SCENE = "synth:tabletop?seed=7&clutter=high"
@@ -62,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"error: {error}", file=sys.stderr)
         return 2
     described = options.model.name if options.model else f"random templates of about {CELLS} x {CELLS} cells"
-    text = describe(options.sequence, frame, described, model, memory, options.repeats)
+    text = describe(without_folders(options.sequence), frame, described, model, memory, options.repeats)
     show_section(TITLE, text + "\n\n" + compare_pyramids(frame, options.repeats), options.write)
     return 0
 
