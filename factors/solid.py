@@ -25,7 +25,7 @@ import numpy as np
 from numba import njit
 
 from ..datasets.frame import Intrinsics
-from .volume import NEAR_MARGIN_M, Projection
+from .volume import NEAR_MARGIN_M, Projection, in_pixels, projection
 
 # Between cans, boxes and bowls: 0.15 and ellipsoids were compared on six rendered surveys (sizes off by 6 % instead of
 # 8, the map's mean average precision in images .91 instead of .88) and on the cabinet.
@@ -47,18 +47,7 @@ def project_solid(
         center: (3,) metres, world frame.
         log_half_axes: (3,) log of metres, along the columns of `R_world_upright`.
     """
-    xyxy, J = np.empty(4), np.zeros((4, 12))
-    # The kernel is compiled once, for the memory order of gtsam.Pose3.matrix().
-    in_front = solid_kernel(
-        np.asfortranarray(T_world_camera, dtype=float),
-        np.ascontiguousarray(R_world_upright, dtype=float),
-        np.ascontiguousarray(center, dtype=float),
-        np.ascontiguousarray(log_half_axes, dtype=float),
-        xyxy,
-        J,
-        True,
-    )
-    return Projection(xyxy, J[:, :6], J[:, 6:9], J[:, 9:], bool(in_front))
+    return projection(solid_kernel, T_world_camera, R_world_upright, center, log_half_axes)
 
 
 def project_solids(
@@ -69,18 +58,7 @@ def project_solids(
     intrinsics: Intrinsics,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Image boxes of the solids of N volumes: arguments and results as of `volume.project_volumes`."""
-    xyxy = np.empty((len(centers), 4))
-    in_front = np.empty(len(centers), dtype=np.bool_)
-    _project_all(
-        np.asfortranarray(T_world_camera, dtype=float),
-        np.ascontiguousarray(R_world_upright, dtype=float),
-        np.ascontiguousarray(centers, dtype=float).reshape(-1, 3),
-        np.ascontiguousarray(log_half_axes, dtype=float).reshape(-1, 3),
-        xyxy,
-        in_front,
-    )
-    scale = np.array([intrinsics.fx, intrinsics.fy] * 2)
-    return xyxy * scale + np.array([intrinsics.cx, intrinsics.cy] * 2), in_front
+    return in_pixels(_project_all, T_world_camera, R_world_upright, centers, log_half_axes, intrinsics)
 
 
 @njit(cache=True)

@@ -27,6 +27,7 @@ at least that, no Jacobian entry exceeds |n| max(|x|, |a|) / NEAR_MARGIN_M.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,9 +68,20 @@ def project_volume(
         center: (3,) metres, world frame.
         log_half_axes: (3,) log of metres, along the columns of `R_world_upright`.
     """
+    return projection(project_kernel, T_world_camera, R_world_upright, center, log_half_axes)
+
+
+def projection(
+    kernel: Callable[..., bool],
+    T_world_camera: np.ndarray,
+    R_world_upright: np.ndarray,
+    center: np.ndarray,
+    log_half_axes: np.ndarray,
+) -> Projection:
+    """What a kernel such as `project_kernel` makes of one volume; arguments as of `project_volume`."""
     xyxy, J = np.empty(4), np.zeros((4, 12))
-    # The kernel is compiled once, for the memory order of gtsam.Pose3.matrix().
-    in_front = project_kernel(
+    # Kernels are compiled once, for the memory order of gtsam.Pose3.matrix().
+    in_front = kernel(
         np.asfortranarray(T_world_camera, dtype=float),
         np.ascontiguousarray(R_world_upright, dtype=float),
         np.ascontiguousarray(center, dtype=float),
@@ -100,9 +112,21 @@ def project_volumes(
         xyxy: (N, 4) pixels, not clipped to the image; NaN where the ellipsoid is not wholly in front of the camera.
         in_front: (N,) bool.
     """
+    return in_pixels(_project_all, T_world_camera, R_world_upright, centers, log_half_axes, intrinsics)
+
+
+def in_pixels(
+    kernel: Callable[..., None],
+    T_world_camera: np.ndarray,
+    R_world_upright: np.ndarray,
+    centers: np.ndarray,
+    log_half_axes: np.ndarray,
+    intrinsics: Intrinsics,
+) -> tuple[np.ndarray, np.ndarray]:
+    """What a kernel of many volumes makes of N; arguments and results as of `project_volumes`."""
     xyxy = np.empty((len(centers), 4))
     in_front = np.empty(len(centers), dtype=np.bool_)
-    _project_all(
+    kernel(
         np.asfortranarray(T_world_camera, dtype=float),
         np.ascontiguousarray(R_world_upright, dtype=float),
         np.ascontiguousarray(centers, dtype=float).reshape(-1, 3),
