@@ -11,6 +11,7 @@ from ...datasets.errors import UserError
 from ...datasets.frame import Frame
 from ..detections import Detections, Part
 from ..probability_maps import ProbabilityMaps
+from ..selection import check_selection
 from .candidates import Candidates, ScoredLevel, candidates, corner_boxes
 from .maps import MapConfig, probability_maps
 from .model import HogModel, HogTemplate, load_model, shipped_model
@@ -60,11 +61,7 @@ class HogDetector:
     _corners: np.ndarray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        for name in ("confidence", "nms_iou"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise UserError(f"{name} must be in [0, 1], but is {getattr(self, name)}")
-        if self.max_detections < 1:
-            raise UserError(f"max_detections must be at least 1, but is {self.max_detections}")
+        check_selection(self.confidence, self.nms_iou, self.max_detections)
         model = self.model
         if not isinstance(model, HogModel):
             model = load_model(shipped_model() if model is None else model)

@@ -14,6 +14,7 @@ from ...datasets.errors import InputError, UserError
 from ...datasets.frame import Frame
 from ..detections import Detections
 from ..letterbox import Letterbox
+from ..selection import check_selection
 from .model import Model, load_model
 from .network import Backend
 from .outputs import OutputFamily, decode
@@ -54,11 +55,7 @@ class OnnxDetector:
     _model: Model = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        for name in ("confidence", "nms_iou"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise UserError(f"{name} must be in [0, 1], but is {getattr(self, name)}")
-        if self.max_detections < 1:
-            raise UserError(f"max_detections must be at least 1, but is {self.max_detections}")
+        check_selection(self.confidence, self.nms_iou, self.max_detections)
         backend = _member(Backend, "backend", self.backend)
         family = None if self.family is None else _member(OutputFamily, "family", self.family)
         model = load_model(Path(self.path), self.classes, backend, self.input_size, family)
