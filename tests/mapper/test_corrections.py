@@ -285,8 +285,8 @@ def test_nothing_is_touched_as_long_as_nothing_moves():
 
 def test_things_by_themselves_may_tell_that_a_place_is_the_same():
     """Where the odometry admits it, four pairs of things that agree close the gap before any loop does."""
-    drive = drive_across(1.0, 180.0)
-    assert worst_pose(drive) < 0.03
+    drive = drive_across(1.0, 90.0)
+    assert worst_pose(drive) < 0.05
     assert {x.number for x in drive.landmarks} == {1, 2, 3, 4}
     assert all(len(at(drive.landmarks, block)) == 1 for block in TABLE)
 
