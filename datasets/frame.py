@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from .lidar import LidarScan
 
 
+AT_REST = (8.5, 11.5)  # m/s^2, about 1 g: beyond it a reading is the hand's
+
+
 @dataclass(frozen=True, slots=True)
 class Intrinsics:
     """Pinhole camera: focal lengths and principal point in pixels, pixel centres at integers."""
@@ -89,6 +92,14 @@ class Frame:
     T_world_camera: np.ndarray | None = None
     specific_force: np.ndarray | None = None
     scan: LidarScan | None = None
+
+    @property
+    def up_at_rest(self) -> np.ndarray | None:
+        """(3,) unit vector up in camera axes by the accelerometer; None without one, or where a hand shakes it."""
+        if self.specific_force is None:
+            return None
+        norm = float(np.linalg.norm(self.specific_force))
+        return self.specific_force / norm if AT_REST[0] < norm < AT_REST[1] else None
 
     @property
     def has_image(self) -> bool:

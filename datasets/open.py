@@ -96,10 +96,11 @@ def _choose(path: Path, dataset: str | None) -> tuple[Loader, Path]:
     if dataset == "folder":
         return loaders[0], path  # its own errors say which part is missing
     looked_for = "; or ".join(f"{loader.layout} ({loader.dataset})" for loader in loaders)
-    raise InputError(path, looked_for, _contents(path), "give the folder that holds a sequence")
+    raise InputError(path, looked_for, contents(path), "give the folder that holds a sequence")
 
 
-def _contents(path: Path) -> str:
+def contents(path: Path) -> str:
+    """What is in a folder, for people: the first names, and how many more."""
     names = sorted(entry.name for entry in path.iterdir())
     if not names:
         return "an empty folder"

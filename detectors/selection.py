@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..datasets.errors import UserError
 
 
-def check_selection(confidence: float, nms_iou: float, max_detections: int) -> None:
+def check_selection(confidence: float, max_detections: int, nms_iou: float = 0.0) -> None:
     """Thresholds in [0, 1], and a number of boxes.
 
     Raises:

@@ -25,7 +25,7 @@ import numpy as np
 from numba import njit
 
 from ..datasets.frame import Intrinsics
-from .volume import NEAR_MARGIN_M, Projection, in_pixels, projection
+from .volume import NEAR_MARGIN_M, Projection, camera_axes, contact_jacobian, in_pixels, projection
 
 # Between cans, boxes and bowls: 0.15 and ellipsoids were compared on six rendered surveys (sizes off by 6 % instead of
 # 8, the map's mean average precision in images .91 instead of .88) and on the cabinet.
@@ -90,11 +90,7 @@ def solid_kernel(T, R_world_upright, center, log_half_axes, xyxy, J, with_jacobi
 @njit(cache=True)
 def _in_camera(T, R, center, log_half_axes, A, D, N, t):
     """Fill axes A (3, 3), spreads D and N (3, 3) and centre t (3,) in the camera frame."""
-    for i in range(3):
-        t[i] = 0.0
-        for k in range(3):
-            t[i] += T[k, i] * (center[k] - T[k, 3])
-            A[i, k] = T[0, i] * R[0, k] + T[1, i] * R[1, k] + T[2, i] * R[2, k]
+    camera_axes(T, R, center, A, t)
     squares = np.exp(2.0 * log_half_axes)
     for i in range(3):
         for j in range(i + 1):
@@ -121,11 +117,8 @@ def _contact(D, N, t, axis, sign, value, n, x, h):
 @njit(cache=True)
 def _side_jacobian(T, A, log_half_axes, n, x, h, sign, row):
     """Fill row (12,): the contact point's motion along the side's normal n, over its depth."""
+    contact_jacobian(T, n, x, row)
     for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        row[i] = (n[j] * x[k] - n[k] * x[j]) / x[2]  # n . (x × w) = w . (n × x)
-        row[3 + i] = -n[i] / x[2]
-        row[6 + i] = (T[i, 0] * n[0] + T[i, 1] * n[1] + T[i, 2] * n[2]) / x[2]
         along = n[0] * A[0, i] + n[1] * A[1, i] + n[2] * A[2, i]
         reach = _FLAT / h[0] + 1.0 / h[1] if i == 2 else 1.0 / h[0] + _FLAT / h[1]
         row[9 + i] = sign * _SCALE * math.exp(2.0 * log_half_axes[i]) * along * along * reach / x[2]

@@ -139,13 +139,19 @@ def in_pixels(
 
 
 @njit(cache=True)
-def camera_quadric(T, R, center, log_half_axes, A, M, t):
-    """Fill axes A (3, 3), spread M (3, 3) and centre t (3,) of an ellipsoid in the camera frame."""
+def camera_axes(T, R, center, A, t):
+    """Fill axes A (3, 3) and centre t (3,) of a volume in the camera frame."""
     for i in range(3):
         t[i] = 0.0
         for k in range(3):
             t[i] += T[k, i] * (center[k] - T[k, 3])
             A[i, k] = T[0, i] * R[0, k] + T[1, i] * R[1, k] + T[2, i] * R[2, k]
+
+
+@njit(cache=True)
+def camera_quadric(T, R, center, log_half_axes, A, M, t):
+    """Fill axes A (3, 3), spread M (3, 3) and centre t (3,) of an ellipsoid in the camera frame."""
+    camera_axes(T, R, center, A, t)
     for i in range(3):
         for j in range(i + 1):
             M[i, j] = 0.0
@@ -187,13 +193,20 @@ def _side_jacobian(T, A, M, t, log_half_axes, side, value, row):
     h = math.sqrt(max(Mn[axis] - value * Mn[2], 1e-300))  # 0 only if the size underflows
     for i in range(3):
         x[i] = t[i] + sign * Mn[i] / h
+    contact_jacobian(T, n, x, row)
+    for i in range(3):
+        along = n[0] * A[0, i] + n[1] * A[1, i] + n[2] * A[2, i]
+        row[9 + i] = sign * math.exp(2.0 * log_half_axes[i]) * along * along / (h * x[2])
+
+
+@njit(cache=True)
+def contact_jacobian(T, n, x, row):
+    """Fill row[:9]: how a side with the normal n moves with the pose and the centre, touched in the point x (3,)."""
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         row[i] = (n[j] * x[k] - n[k] * x[j]) / x[2]  # n . (x × w) = w . (n × x)
         row[3 + i] = -n[i] / x[2]
         row[6 + i] = (T[i, 0] * n[0] + T[i, 1] * n[1] + T[i, 2] * n[2]) / x[2]
-        along = n[0] * A[0, i] + n[1] * A[1, i] + n[2] * A[2, i]
-        row[9 + i] = sign * math.exp(2.0 * log_half_axes[i]) * along * along / (h * x[2])
 
 
 @njit(cache=True)

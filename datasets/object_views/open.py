@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError
-from ..open import LOADERS, SAMPLE_PREFIX, SYNTH_PREFIX, open_sequence
+from ..open import LOADERS, SAMPLE_PREFIX, SYNTH_PREFIX, contents, open_sequence
 from ..paths import user_path
 from . import coco_folder, pcd_views, washington
 from .object_view import ObjectViews
@@ -89,6 +89,4 @@ def _open(spec: str | Path) -> ObjectViews:
         raise InputError(path, "one kind of views", found, "put each kind into a folder of its own and give both")
     if any(loader.find(path) for loader in LOADERS):  # last: single clouds look like a LiDAR's sweeps as well
         return sequence_views(open_sequence(path))
-    names = sorted(entry.name for entry in path.iterdir())
-    found = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
-    raise InputError(path, f"a folder of {known}", found or "an empty folder", "give a folder of one of these")
+    raise InputError(path, f"a folder of {known}", contents(path), "give a folder of one of these")

@@ -61,7 +61,7 @@ class HogDetector:
     _corners: np.ndarray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        check_selection(self.confidence, self.nms_iou, self.max_detections)
+        check_selection(self.confidence, self.max_detections, self.nms_iou)
         model = self.model
         if not isinstance(model, HogModel):
             model = load_model(shipped_model() if model is None else model)

@@ -55,7 +55,7 @@ class OnnxDetector:
     _model: Model = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        check_selection(self.confidence, self.nms_iou, self.max_detections)
+        check_selection(self.confidence, self.max_detections, self.nms_iou)
         backend = _member(Backend, "backend", self.backend)
         family = None if self.family is None else _member(OutputFamily, "family", self.family)
         model = load_model(Path(self.path), self.classes, backend, self.input_size, family)

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...datasets.errors import UserError
 from ...datasets.frame import Frame
 from ..detections import Detections
+from ..selection import check_selection
 from .config import ProposalConfig
 from .objectness import Objectness, proposal_features, shipped_objectness
 from .proposals import find_proposals
@@ -43,10 +43,7 @@ class ProposalDetector:
     objectness: Objectness = field(default_factory=shipped_objectness)
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.confidence <= 1.0:
-            raise UserError(f"confidence must be in [0, 1], but is {self.confidence}")
-        if self.max_detections < 1:
-            raise UserError(f"max_detections must be at least 1, but is {self.max_detections}")
+        check_selection(self.confidence, self.max_detections)
 
     @property
     def classes(self) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...datasets.frame import Frame, Intrinsics
+from ...datasets.frame import Intrinsics
 from .config import PlaneConfig
 from .plane_growing import assign_points, cell_moments, grow_planes, join_planes
 from .point_grid import PointGrid
@@ -45,14 +45,6 @@ class Planes:
 
     def __len__(self) -> int:
         return len(self.offsets)
-
-
-def measured_up(frame: Frame) -> np.ndarray | None:
-    """(3,) unit vector up in camera axes by the accelerometer; None without one, or where the hand shakes it."""
-    if frame.specific_force is None:
-        return None
-    norm = float(np.linalg.norm(frame.specific_force))
-    return frame.specific_force / norm if 8.5 < norm < 11.5 else None  # m/s^2, about 1 g
 
 
 def find_planes(grid: PointGrid, intrinsics: Intrinsics, config: PlaneConfig, up: np.ndarray | None = None) -> Planes:

@@ -11,7 +11,7 @@ from ...datasets.frame import Frame
 from .config import ProposalConfig
 from .joining import joined
 from .mean_shift import mean_shift
-from .planes import Planes, find_planes, measured_up
+from .planes import Planes, find_planes
 from .point_grid import PointGrid, point_grid
 from .segments import connected_pieces, piece_bounds, renumbered
 
@@ -84,7 +84,7 @@ def find_proposals(frame: Frame, config: ProposalConfig | None = None, up: np.nd
     """
     config = ProposalConfig() if config is None else config
     grid = point_grid(frame.depth, frame.intrinsics, config.step(frame.depth.shape[1]), config.near, config.far)
-    up = measured_up(frame) if up is None else up
+    up = frame.up_at_rest if up is None else up
     planes = find_planes(grid, frame.intrinsics, config.planes, up)
     clusters = cluster_image(grid, planes, config)
     pieces = pieces_of_things(grid, clusters, config)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
+    from rich.progress import ProgressColumn
 
 PLAIN_LINES = 10  # at most, for a whole run whose output is not a terminal
 
@@ -24,7 +25,7 @@ class FrameProgress:
     def __enter__(self) -> FrameProgress:
         self._start = time.perf_counter()
         if sys.stderr.isatty():
-            self._bar = _bar()
+            self._bar = _frame_bar()
             self._task = self._bar.add_task(self._title, total=self._total, note="", rate="")
             self._bar.start()
         return self
@@ -43,16 +44,16 @@ class FrameProgress:
             print(f"{self._title}: {done}/{self._total} frames, {rate}, {note}", file=sys.stderr, flush=True)
 
 
-def _bar() -> Bar:
+def bar(*columns: ProgressColumn) -> Bar:
+    """A bar with these columns after how much is done, on stderr."""
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]}"),
-        TextColumn("{task.fields[note]}"),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-    )
+    first = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()
+    return Progress(*first, *columns, console=Console(stderr=True))
+
+
+def _frame_bar() -> Bar:
+    from rich.progress import TextColumn, TimeRemainingColumn
+
+    return bar(TextColumn("{task.fields[rate]}"), TextColumn("{task.fields[note]}"), TimeRemainingColumn())

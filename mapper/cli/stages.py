@@ -6,6 +6,8 @@ import sys
 import time
 from typing import TYPE_CHECKING, Any
 
+from .progress import bar
+
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars
 
@@ -21,7 +23,9 @@ class StageProgress:
 
     def __enter__(self) -> StageProgress:
         if sys.stderr.isatty():
-            self._bars = _bars()
+            from rich.progress import TimeElapsedColumn
+
+            self._bars = bar(TimeElapsedColumn())
             self._bars.start()
         return self
 
@@ -39,11 +43,3 @@ class StageProgress:
             self._bars.update(self._task, completed=done)
         elif done == total:
             print(f"{stage}: {total} in {time.perf_counter() - self._start:.0f} s", file=sys.stderr, flush=True)
-
-
-def _bars() -> Bars:
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
-    return Progress(*columns, console=Console(stderr=True))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from ...detectors.boxes import areas, common_areas
 from ..config import AssociationConfig
 from .lifting import LiftedDetection
 
@@ -77,31 +78,16 @@ def alignment_costs(boxes: np.ndarray, predicted: np.ndarray, config: Associatio
 
 def box_sides(boxes: np.ndarray) -> np.ndarray:
     """(N,) geometric mean of a box's sides, pixels; 0 for one that is empty or NaN."""
-    return np.sqrt(_areas(boxes))
+    return np.sqrt(areas(boxes))
 
 
 def shares_inside(boxes: np.ndarray, others: np.ndarray) -> np.ndarray:
     """(N, M) share of each box's area that lies inside each of the others; 0 where either is NaN."""
-    return _common_areas(boxes, others) / np.maximum(_areas(boxes), 1e-9)[:, None]
-
-
-def box_overlaps(boxes: np.ndarray) -> np.ndarray:
-    """(N, N) intersection over union of (N, 4) boxes with each other."""
-    common, areas = _common_areas(boxes, boxes), _areas(boxes)
-    return common / np.maximum(areas[:, None] + areas[None] - common, 1e-9)
+    return common_areas(boxes, others) / np.maximum(areas(boxes), 1e-9)[:, None]
 
 
 def _middles(boxes: np.ndarray) -> np.ndarray:
     return (boxes[:, :2] + boxes[:, 2:]) / 2.0
-
-
-def _areas(boxes: np.ndarray) -> np.ndarray:
-    return np.maximum(np.nan_to_num(boxes[:, 2:] - boxes[:, :2]), 0.0).prod(axis=1)
-
-
-def _common_areas(boxes: np.ndarray, others: np.ndarray) -> np.ndarray:
-    size = np.minimum(boxes[:, None, 2:], others[None, :, 2:]) - np.maximum(boxes[:, None, :2], others[None, :, :2])
-    return np.maximum(np.nan_to_num(size), 0.0).prod(axis=2)
 
 
 @njit(cache=True)

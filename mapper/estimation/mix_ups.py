@@ -17,7 +17,7 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from ..config import LifecycleConfig
-from ..trajectory.rigid import inverse, tangent
+from ..trajectory.rigid import chi_square, inverse
 from .landmarks import Landmark
 from .records import DepthCentre, Loop
 from .smoother import Smoother
@@ -50,8 +50,7 @@ class MixUp:
 
 def disobeys(loop: Loop, poses: np.ndarray) -> bool:
     """Whether (M, 4, 4) poses are far from what a closure says, by its own covariance."""
-    off = tangent(loop.T_a_b, inverse(poses[loop.a]) @ poses[loop.b])
-    return bool(off @ np.linalg.solve(loop.covariance, off) > OBEYED)
+    return chi_square(loop.T_a_b, inverse(poses[loop.a]) @ poses[loop.b], loop.covariance) > OBEYED
 
 
 def find_mix_ups(

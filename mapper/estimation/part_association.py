@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...detectors.boxes import box_ious
 from ...detectors.detections import Part
-from .association_costs import DetectionArrays, box_overlaps
+from .association_costs import DetectionArrays
 
 # Implied boxes of one object overlap by this much at least. Where two halves are known to a tenth of their sides, their
 # wholes are to a fifth, and overlap by half; neighbours of like size have to stand within half their width for it. With
@@ -61,4 +62,4 @@ def _overlaps_at_like_depth(detections: DetectionArrays) -> np.ndarray:
     apart = np.abs(detections.ranges[:, None] - detections.ranges[None])
     noise = np.hypot(detections.sigma_range[:, None], detections.sigma_range[None])
     depth = (detections.half_widths[:, None] + detections.half_widths[None]) / 2.0
-    return np.where(apart <= noise + depth, box_overlaps(detections.whole_xyxy), 0.0)
+    return np.where(apart <= noise + depth, box_ious(detections.whole_xyxy, detections.whole_xyxy), 0.0)

@@ -22,7 +22,7 @@ from .known_place import KnownPlace
 from .loops.loop_closer import LoopCloser
 from .odometry.odometry import OdometryStep, Tracking, TrackingOutcome, fused, widened
 from .odometry.sources import make_odometry
-from .rigid import inverse, tangent
+from .rigid import chi_square, inverse
 from .sparse_frames import SparseFrames
 from .up import UpMeasurement, camera_prior, from_accelerometer, from_planes, scanner_prior
 from .visual.features import FeatureExtractor, Features
@@ -199,8 +199,9 @@ class CameraGraph:
         Args:
             covariance: (6, 6) of that, and of what the edge lacks.
         """
-        off = tangent(edge.motion.T_a_b, inverse(self.smoother.pose(edge.a)) @ T_world_camera)
-        return bool(off @ np.linalg.solve(covariance + edge.motion.covariance, off) < self._config.visual.gate)
+        T_estimated = inverse(self.smoother.pose(edge.a)) @ T_world_camera
+        squared = chi_square(edge.motion.T_a_b, T_estimated, covariance + edge.motion.covariance)
+        return squared < self._config.visual.gate
 
     def pose(self) -> np.ndarray:
         """(4, 4) `T_world_camera` of the last frame, as estimated now."""

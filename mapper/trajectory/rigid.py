@@ -19,6 +19,12 @@ def tangent(T: np.ndarray, T_other: np.ndarray) -> np.ndarray:
     return gtsam.Pose3.Logmap(gtsam.Pose3(nearest_rigid(T)).between(gtsam.Pose3(nearest_rigid(T_other))))
 
 
+def chi_square(T: np.ndarray, T_other: np.ndarray, covariance: np.ndarray) -> float:
+    """Squared Mahalanobis distance of two (4, 4) poses, by a (6, 6) covariance in the first one's right tangent."""
+    off = tangent(T, T_other)
+    return float(off @ np.linalg.solve(covariance, off))
+
+
 def retracted(T: np.ndarray, step: np.ndarray) -> np.ndarray:
     """(4, 4) pose a (6,) step in its right tangent away: T Exp(step)."""
     return nearest_rigid(T @ gtsam.Pose3.Expmap(step).matrix())

@@ -37,12 +37,8 @@ def scanner_prior(frame: Frame, config: UpConfig) -> UpMeasurement | None:
 
 def from_accelerometer(frame: Frame, config: UpConfig) -> UpMeasurement | None:
     """At rest the specific force points up; readings far from 1 g are the hand's and are left out."""
-    if frame.specific_force is None:
-        return None
-    norm = float(np.linalg.norm(frame.specific_force))
-    if not 8.5 < norm < 11.5:
-        return None
-    return UpMeasurement(frame.specific_force / norm, config.accelerometer_sigma, "accelerometer")
+    up = frame.up_at_rest
+    return None if up is None else UpMeasurement(up, config.accelerometer_sigma, "accelerometer")
 
 
 def from_planes(frame: Frame, up_camera: np.ndarray, config: UpConfig) -> UpMeasurement | None:

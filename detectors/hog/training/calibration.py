@@ -16,6 +16,7 @@ import numpy as np
 
 from ....datasets.object_views.backgrounds import Background
 from ....datasets.object_views.object_view import ObjectView, cut_out
+from ...boxes import box_ious
 from ...parts import part_box
 from ...platt import fit_platt
 from ..model import HogTemplate
@@ -24,7 +25,7 @@ from ..scoring import Scorer, part_boxes
 from ..suppression import suppress
 from .config import TrainConfig
 from .keeping import Kept
-from .mining import FrameWindows, box_overlap
+from .mining import FrameWindows
 from .placing import in_surroundings
 from .rounds import frame_pyramid
 
@@ -87,7 +88,7 @@ def _best_scores(templates: Sequence[HogTemplate], view: ObjectView, config: Tra
             ij = np.argwhere(np.isfinite(scores[t]))
             if len(ij) == 0:
                 continue
-            overlap = box_overlap(part_boxes(template, level, ij), part_box(view.xyxy[None], template.part))[:, 0]
+            overlap = box_ious(part_boxes(template, level, ij), part_box(view.xyxy[None], template.part))[:, 0]
             showing = ij[overlap >= config.found_overlap]
             if len(showing):
                 score = float(scores[t, showing[:, 0], showing[:, 1]].max())

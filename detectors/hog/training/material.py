@@ -53,11 +53,11 @@ def gather(views: ObjectViews, backgrounds: Backgrounds, config: TrainConfig, on
     learned, held_out = split_frames(len(backgrounds), config.held_out)
     frames = kept_frames(backgrounds, learned, config.memory // 4)
     pictures = kept_views(views, selection.learned, config.memory // 2)
-    boxes = _read_boxes(views.labels, pictures, config, on_progress)
+    boxes, labels = _read_boxes(views.labels, pictures, config, on_progress)
     _check_frames(frames, config)
     windows = {label: class_windows(box, config) for label, box in boxes.items()}
     own, others = collect_examples(
-        pictures, windows, frames, config, lambda done: on_progress("features of objects", done, len(pictures))
+        pictures, labels, windows, frames, config, lambda done: on_progress("features of objects", done, len(pictures))
     )
     positives = {label: sum(len(one) for (its, _), one in own.items() if its == label) for label in windows}
     for label, count in positives.items():
@@ -96,8 +96,9 @@ def gather(views: ObjectViews, backgrounds: Backgrounds, config: TrainConfig, on
 
 def _read_boxes(
     labels: tuple[str, ...], pictures: Kept[ObjectView | None], config: TrainConfig, on_progress: OnProgress
-) -> dict[str, np.ndarray]:
-    """(N, 4) boxes of the views of every class."""
+) -> tuple[dict[str, np.ndarray], list[str | None]]:
+    """(N, 4) boxes of the views of every class, and the class of each view, None for one that cannot be used."""
+    of_views: list[str | None] = []
     boxes: dict[str, list[np.ndarray]] = {label: [] for label in labels}
     for number, view in enumerate(pictures):
         if view is not None:
@@ -106,11 +107,12 @@ def _read_boxes(
                     f"{view.name}: this view has no depth; train with --channels rgb, or give views with depth"
                 )
             boxes[view.label].append(view.xyxy)
+        of_views.append(None if view is None else view.label)
         on_progress("reading objects", number + 1, len(pictures))
     for label, found in boxes.items():
         if not found:
             raise UserError(f"no view of {label!r} can be used; leave the class out, or give other views of it")
-    return {label: np.stack(found) for label, found in boxes.items()}
+    return {label: np.stack(found) for label, found in boxes.items()}, of_views
 
 
 def _check_frames(frames: Kept[Background | None], config: TrainConfig) -> None:

@@ -9,6 +9,7 @@ from itertools import pairwise, product
 import numpy as np
 
 from ....datasets.object_views.backgrounds import Background
+from ...boxes import box_ious
 from ...parts import part_box
 from ..model import HogTemplate
 from ..pyramid import Pyramid
@@ -95,7 +96,7 @@ class FrameWindows:
         own = np.array([label == self._classes[template.class_id] for label in self._frame.labels], dtype=bool)
         if not own.any() or len(windows.place) == 0:
             return windows
-        overlap = box_overlap(self.boxes(t, windows), part_box(self._frame.xyxy[own], template.part))
+        overlap = box_ious(self.boxes(t, windows), part_box(self._frame.xyxy[own], template.part))
         return windows.select(overlap.max(axis=1) < self._ignored_overlap)
 
     def boxes(self, t: int, windows: Windows) -> np.ndarray:
@@ -125,11 +126,3 @@ def _by_score(parts: Sequence[Windows]) -> Windows:
     place = np.concatenate([np.zeros((0, 3), np.int32), *(one.place for one in parts)])
     score = np.concatenate([np.zeros(0, np.float32), *(one.score for one in parts)])
     return Windows(place, score).select(np.argsort(-score, kind="stable"))
-
-
-def box_overlap(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(N, M) intersection over union of boxes (N, 4) and (M, 4)."""
-    size = np.minimum(a[:, None, 2:], b[None, :, 2:]) - np.maximum(a[:, None, :2], b[None, :, :2])
-    shared = np.clip(size, 0.0, None).prod(axis=2)
-    area_a, area_b = ((box[:, 2:] - box[:, :2]).prod(axis=1) for box in (a, b))
-    return shared / np.maximum(area_a[:, None] + area_b[None] - shared, 1e-9)

@@ -96,6 +96,7 @@ def window_scale(window: np.ndarray, shape: WindowShape) -> float:
 
 def collect_examples(
     views: Kept[ObjectView | None],
+    labels: Sequence[str | None],
     windows: dict[str, ClassWindows],
     backgrounds: Kept[Background | None],
     config: TrainConfig,
@@ -103,9 +104,10 @@ def collect_examples(
 ) -> tuple[dict[Kind, Examples], dict[Kind, Examples]]:
     """Positives of every class and window, and objects of the other classes seen through the window.
 
-    The latter are each class's first negatives, as Lai et al. have them (III-C); they are not mirrored.
+    The latter are each class's first negatives, as Lai et al. have them (III-C); they are not mirrored. `labels`
+    are the views' classes, None for one that cannot be used.
     """
-    chosen = _other_views(views, tuple(windows), config)
+    chosen = _other_views(labels, tuple(windows), config)
     shapes = {(label, k): shape for label, its in windows.items() for k, shape in enumerate(its.shapes)}
     own: dict[Kind, list[Examples]] = {kind: [] for kind in shapes}
     other: dict[Kind, list[Examples]] = {kind: [] for kind in shapes}
@@ -126,9 +128,8 @@ def collect_examples(
     )
 
 
-def _other_views(views: Kept[ObjectView | None], classes: Sequence[str], config: TrainConfig) -> dict[int, list[str]]:
+def _other_views(labels: Sequence[str | None], classes: Sequence[str], config: TrainConfig) -> dict[int, list[str]]:
     """Number of a view -> the classes that take it as a negative."""
-    labels = [None if view is None else view.label for view in views]
     chosen: dict[int, list[str]] = {}
     for place, label in enumerate(classes):
         strangers = [number for number, its in enumerate(labels) if its is not None and its != label]

@@ -17,8 +17,9 @@ from enum import IntEnum
 
 import numpy as np
 
+from ....detectors.boxes import box_ious
 from .curves import Scored
-from .image_boxes import FoundBoxes, TrueBoxes, box_areas
+from .image_boxes import FoundBoxes, TrueBoxes
 
 NOTHING = -1  # row of the object that a box found, where it found none
 MIN_INSIDE = 0.5  # a claim with less of its box in the image is not false there: most of it cannot be checked
@@ -49,16 +50,6 @@ class Matches:
     true: TrueBoxes
     outcome: np.ndarray
     object_row: np.ndarray
-
-
-def box_ious(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(N, M) intersection over union of (N, 4) and (M, 4) boxes; 0 where one is NaN or has no area."""
-    low = np.maximum(a[:, None, :2], b[None, :, :2])
-    high = np.minimum(a[:, None, 2:], b[None, :, 2:])
-    shared = np.prod(np.maximum(high - low, 0.0), axis=2)
-    union = box_areas(a)[:, None] + box_areas(b)[None, :] - shared
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.nan_to_num(np.where(shared > 0.0, shared / union, 0.0))
 
 
 def match_boxes(found: FoundBoxes, true: TrueBoxes, box_iou: float, frame: int = 0) -> Matches:

@@ -23,7 +23,7 @@ from ...estimation.records import Link, Loop, ScanMatch
 from ...estimation.smoother import Smoother
 from ..constellation.candidates import LoopCandidate
 from ..known_place import is_wide
-from ..rigid import inverse, pose_covariance, tangent
+from ..rigid import chi_square, inverse, pose_covariance
 from ..sparse_frames import SparseFrames
 from ..visual.features import Features
 from .link_jobs import Candidate, LinkConfig, LinkFound, LinkJob, LinkKind, find_links
@@ -211,9 +211,9 @@ class LoopCloser:
 
     def _agrees(self, link: LinkFound, poses: np.ndarray, known: np.ndarray) -> bool:
         """Whether a link lies within the gate around the estimate."""
-        off = tangent(link.motion.T_a_b, inverse(poses[link.a]) @ poses[link.b])
         covariance = known + link.motion.covariance + pose_covariance(self._config.gate_floor)
-        return bool(off @ np.linalg.solve(covariance, off) < self._config.gate)
+        T_estimated = inverse(poses[link.a]) @ poses[link.b]
+        return chi_square(link.motion.T_a_b, T_estimated, covariance) < self._config.gate
 
 
 def _widened(link: LinkFound, missing: np.ndarray) -> LinkFound:

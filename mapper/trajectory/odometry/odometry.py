@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from ....datasets.frame import Frame
-from ..rigid import inverse, pose_covariance, retracted, rotation_angle, tangent
+from ..rigid import chi_square, inverse, pose_covariance, retracted, rotation_angle, tangent
 
 
 class TrackingOutcome(Enum):
@@ -68,9 +68,10 @@ def widened(
         T_other, covariance_other: the one that is relied on.
         gate: chi-square of 6 degrees of freedom, up to which the two agree and nothing is changed.
     """
+    if chi_square(T, T_other, covariance + covariance_other) <= gate:
+        return covariance
     d = tangent(T, T_other)
-    agree = d @ np.linalg.solve(covariance + covariance_other, d) <= gate
-    return covariance if agree else covariance + np.outer(d, d)
+    return covariance + np.outer(d, d)
 
 
 class Odometry(Protocol):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from thingmap.detectors.proposals.config import PlaneConfig
-from thingmap.detectors.proposals.planes import _likely_up, find_planes, measured_up
+from thingmap.detectors.proposals.planes import _likely_up, find_planes
 from thingmap.detectors.proposals.point_grid import point_grid
 
 from .conftest import CAMERA, table_depth, up_of
@@ -102,9 +102,9 @@ def test_noise_does_not_part_a_table():
 
 def test_accelerometer(make_table):
     up = up_of(0.6)
-    assert measured_up(make_table([])) is None
-    np.testing.assert_allclose(measured_up(make_table([], specific_force=9.8 * up)), up)
-    assert measured_up(make_table([], specific_force=15.0 * up)) is None
+    assert make_table([]).up_at_rest is None
+    np.testing.assert_allclose(make_table([], specific_force=9.8 * up).up_at_rest, up)
+    assert make_table([], specific_force=15.0 * up).up_at_rest is None
 
 
 def test_what_is_large_is_configured():

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from thingmap.detectors.boxes import box_ious
 from thingmap.mapper.config import AssociationConfig
 from thingmap.mapper.estimation.association_costs import (
     DetectionArrays,
     alignment_costs,
-    box_overlaps,
     box_sides,
     position_costs,
     shares_inside,
@@ -64,7 +64,7 @@ def test_sides_shares_and_overlaps():
     boxes = np.array([[0.0, 0.0, 10.0, 10.0], [5.0, 0.0, 15.0, 10.0], [20.0, 0.0, 30.0, 40.0], [2.0, 2.0, 4.0, 12.0]])
     np.testing.assert_allclose(box_sides(boxes), [10.0, 10.0, 20.0, np.sqrt(20.0)])
     np.testing.assert_allclose(shares_inside(boxes, boxes[:2])[:, 0], [1.0, 0.5, 0.0, 0.8])
-    overlaps = box_overlaps(boxes)
+    overlaps = box_ious(boxes, boxes)
     np.testing.assert_allclose(overlaps, overlaps.T)
     np.testing.assert_allclose(np.diag(overlaps), 1.0)
     assert overlaps[0, 1] == pytest.approx(50.0 / 150.0) and overlaps[0, 2] == 0.0

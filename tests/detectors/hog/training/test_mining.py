@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from thingmap.datasets.object_views.backgrounds import Background
+from thingmap.detectors.boxes import box_ious
 from thingmap.detectors.detections import Part
 from thingmap.detectors.hog.model import HogTemplate
-from thingmap.detectors.hog.training.mining import FrameWindows, box_overlap
+from thingmap.detectors.hog.training.mining import FrameWindows
 from thingmap.detectors.hog.training.negatives import Negatives, key, sample_rows, window_samples
 from thingmap.detectors.hog.training.rounds import frame_pyramid
 from thingmap.detectors.parts import part_box
@@ -49,16 +50,16 @@ def test_true_objects_of_the_class_are_left_out_and_others_not(looking, unknowin
     frame, windows, _ = looking
     for t in (0, 1):
         every, kept = unknowing.hard(-50.0)[t], windows.hard(-50.0)[t]
-        shown = box_overlap(unknowing.boxes(t, every), frame.xyxy[[t]])[:, 0] >= 0.3
+        shown = box_ious(unknowing.boxes(t, every), frame.xyxy[[t]])[:, 0] >= 0.3
         assert shown.any()
         np.testing.assert_array_equal(kept.place, every.place[~shown])
-        assert (box_overlap(windows.boxes(t, kept), frame.xyxy[[1 - t]]) >= 0.3).any()
+        assert (box_ious(windows.boxes(t, kept), frame.xyxy[[1 - t]]) >= 0.3).any()
 
 
 def test_a_half_template_leaves_out_its_own_half_only(looking, unknowing):
     frame, windows, _ = looking
     every, kept = unknowing.hard(-50.0)[2], windows.hard(-50.0)[2]
-    shown = box_overlap(unknowing.boxes(2, every), part_box(frame.xyxy[[0]], Part.LEFT))[:, 0] >= 0.3
+    shown = box_ious(unknowing.boxes(2, every), part_box(frame.xyxy[[0]], Part.LEFT))[:, 0] >= 0.3
     assert shown.any()
     np.testing.assert_array_equal(kept.place, every.place[~shown])
 

@@ -6,11 +6,11 @@ import pytest
 
 from thingmap.datasets.errors import InputError, UserError
 from thingmap.datasets.frame import Frame, Intrinsics
+from thingmap.detectors.boxes import box_ious
 from thingmap.detectors.detections import Part
 from thingmap.detectors.hog.channels import Channels
 from thingmap.detectors.hog.detector import HogDetector
 from thingmap.detectors.hog.model import HogModel
-from thingmap.detectors.hog.training.mining import box_overlap
 from thingmap.detectors.hog.training.train import train
 
 
@@ -55,7 +55,7 @@ def test_the_two_best_boxes_are_the_two_objects(model, make_frame_with):
         height, width = scene.color.shape[:2]
         camera = Intrinsics(width, height, scene.focal, scene.focal, width / 2, height / 2)
         found = detector(Frame(0, scene.name, 0.0, scene.color, scene.depth, camera)).select(slice(0, 2))
-        overlap = box_overlap(found.xyxy, scene.xyxy)
+        overlap = box_ious(found.xyxy, scene.xyxy)
         same = np.array(found.classes)[found.class_id][:, None] == np.array(scene.labels)[None]
         right += int(((overlap >= 0.5) & same).any(axis=0).sum())
     assert right >= 17, right  # of 20
