@@ -12,12 +12,14 @@ import numpy as np
 from ...datasets.errors import InputError
 from ..checks import checked_classes
 from ..detections import Part
+from ..model_file import read_document, write_document
 from ..platt import probability
 from .channels import Channels
 from .config import PyramidConfig
-from .model_file import REMEDY, read_document, write_document
 
 SCHEMA = "thingmap-hog/1"
+KIND = "a HOG model"
+REMEDY = "train a model with `thingmap train hog`, or say `hog` alone for the one that is shipped"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,7 +139,7 @@ def load_model(path: str | Path) -> HogModel:
         InputError: for anything else; it says what was found.
     """
     path = Path(path)
-    document, arrays = read_document(path, SCHEMA)
+    document, arrays = read_document(path, SCHEMA, KIND, REMEDY)
     try:
         return HogModel(
             tuple(document["classes"]),
@@ -147,9 +149,9 @@ def load_model(path: str | Path) -> HogModel:
             document["about"],
         )
     except KeyError as error:
-        raise InputError(path, f"a HOG model ({SCHEMA})", f"no {error.args[0]!r} in it", REMEDY) from None
+        raise InputError(path, f"{KIND} ({SCHEMA})", f"no {error.args[0]!r} in it", REMEDY) from None
     except (TypeError, ValueError, AttributeError) as error:
-        raise InputError(path, f"a HOG model ({SCHEMA})", str(error), REMEDY) from None
+        raise InputError(path, f"{KIND} ({SCHEMA})", str(error), REMEDY) from None
 
 
 def shipped_model() -> Path:

@@ -19,12 +19,12 @@ from ....datasets.object_views.object_view import ObjectView, cut_out
 from ...boxes import box_ious
 from ...parts import part_box
 from ...platt import fit_platt
+from ...training.keeping import Kept
 from ..model import HogTemplate
 from ..pyramid import Pyramid, build_pyramid
 from ..scoring import Scorer, part_boxes
 from ..suppression import suppress
 from .config import TrainConfig
-from .keeping import Kept
 from .mining import FrameWindows
 from .placing import in_surroundings
 from .rounds import frame_pyramid

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ....datasets.errors import InputError
-from ..model_file import read_document, write_document
+from ...model_file import read_document, write_document
 from .learner import Learner
 
 SCHEMA = "thingmap-hog-training/1"
@@ -61,10 +61,7 @@ def load_checkpoint(path: Path, settings: Mapping[str, Any], learners: Sequence[
         return None
     remedy = "remove it to start over, or choose another output"
     expected = "the checkpoint of this training"
-    try:
-        document, arrays = read_document(path, SCHEMA)
-    except InputError as error:
-        raise InputError(path, expected, error.found, remedy) from None
+    document, arrays = read_document(path, SCHEMA, expected, remedy)
     try:
         if document["settings"] != dict(settings):
             other = sorted(name for name in settings if document["settings"].get(name) != settings[name])

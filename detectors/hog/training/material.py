@@ -11,12 +11,13 @@ from ....datasets.errors import UserError
 from ....datasets.object_views.backgrounds import Background, Backgrounds
 from ....datasets.object_views.object_view import ObjectView, ObjectViews
 from ...detections import Part
+from ...training.images import kept_frames, kept_views
+from ...training.keeping import Kept
+from ...training.selection import select_views, split_frames
 from .config import TrainConfig
-from .frames import kept_frames, kept_views, mined_frames
-from .keeping import Kept
+from .frames import mined_frames
 from .learner import Learner, new_learner
 from .positives import collect_examples
-from .selection import select_views, split_frames
 from .windows import class_windows
 
 OnProgress = Callable[[str, int, int], None]  # stage, done, of how many
@@ -49,7 +50,7 @@ def gather(views: ObjectViews, backgrounds: Backgrounds, config: TrainConfig, on
         UserError: there are no views or no frames, views or frames lack depth that the channels need, or all views of a
             class are unusable.
     """
-    selection = select_views(views, config)
+    selection = select_views(views, config.held_out, config.views, config.held_out_views, config.seed)
     learned, held_out = split_frames(len(backgrounds), config.held_out)
     frames = kept_frames(backgrounds, learned, config.memory // 4)
     pictures = kept_views(views, selection.learned, config.memory // 2)

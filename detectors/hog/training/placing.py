@@ -7,7 +7,7 @@ import numpy as np
 from ....datasets.object_views.backgrounds import Background
 from ....datasets.object_views.composing import composed
 from ....datasets.object_views.object_view import ObjectView
-from .keeping import Kept
+from ...training.keeping import Kept
 
 TRIES = 5  # backgrounds, until one has a place for the object
 

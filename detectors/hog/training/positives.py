@@ -9,10 +9,10 @@ import numpy as np
 
 from ....datasets.object_views.backgrounds import Background
 from ....datasets.object_views.object_view import ObjectView, cut_out
+from ...training.keeping import Kept
 from ..channels import CELL
 from ..pyramid import window_features
 from .config import TrainConfig
-from .keeping import Kept
 from .placing import in_surroundings
 from .windows import ClassWindows, WindowShape
 

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from ....datasets.object_views.backgrounds import Background
+from ...training.keeping import Kept
 from ..pyramid import Pyramid, build_pyramid
 from .config import TrainConfig
-from .keeping import Kept
 from .learner import Learner
 from .mining import FrameWindows, Windows
 from .negatives import Negatives, key, window_samples

@@ -11,7 +11,7 @@ import pytest
 
 from thingmap.datasets.errors import InputError, UserError
 from thingmap.detectors.detections import Part
-from thingmap.detectors.hog import model_file
+from thingmap.detectors.hog import model as hog_model
 from thingmap.detectors.hog.channels import Channels
 from thingmap.detectors.hog.config import PyramidConfig
 from thingmap.detectors.hog.model import SCHEMA, HogModel, HogTemplate, load_model, shipped_model
@@ -131,7 +131,7 @@ def test_files_that_are_no_models(model: HogModel, tmp_path: Path, spoil, found:
     spoil(path)
     with pytest.raises(InputError, match=found) as error:
         load_model(path)
-    assert error.value.path == path and error.value.remedy == model_file.REMEDY
+    assert error.value.path == path and error.value.remedy == hog_model.REMEDY
 
 
 @pytest.mark.parametrize(
@@ -152,4 +152,4 @@ def test_templates_without_sense(change: dict, message: str):
 
 def test_the_shipped_model_lies_in_the_package():
     assert shipped_model().name == "synthetic.npz"
-    assert shipped_model().parent.parent == Path(model_file.__file__).parent
+    assert shipped_model().parent.parent == Path(hog_model.__file__).parent

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....datasets.errors import UserError
-from ....datasets.object_views.object_view import ObjectViews, ViewEntry
-from .config import TrainConfig
+from ...datasets.errors import UserError
+from ...datasets.object_views.object_view import ObjectViews, ViewEntry
 
 FEWEST_INSTANCES = 3  # from so many on, a class gives whole instances away; with two, half of what there is would go
 LARGEST_LOSS = 2.0  # times the share held out, that an instance may have of a class's views to be given away
@@ -22,8 +21,8 @@ class Selection:
     """Positions in `ObjectViews.entries`, ascending.
 
     Attributes:
-        learned: what templates are learned from.
-        held_out: what they are calibrated with; of a class with too few views, those that it is learned from.
+        learned: what is learned from.
+        held_out: what only calibration sees; of a class with too few views, those that are learned from.
         instances: label -> instances held out as wholes; 0 where views of every instance were.
     """
 
@@ -32,24 +31,33 @@ class Selection:
     instances: dict[str, int]
 
 
-def select_views(views: ObjectViews, config: TrainConfig) -> Selection:
+def select_views(
+    views: ObjectViews, share: float = 0.2, most: int = 300, most_held_out: int = 60, seed: int = 0
+) -> Selection:
     """Divides the views of every class.
+
+    Args:
+        views: of all classes.
+        share: of instances, or of views, that are held out.
+        most: views of a class that are learned from, spread evenly.
+        most_held_out: the same of those held out.
+        seed: of which instances these are.
 
     Raises:
         UserError: there are no views.
     """
     if len(views) == 0:
-        raise UserError("no views of objects to learn from; see docs/hog.md for the folders that are understood")
+        raise UserError("no views of objects to learn from; `thingmap train --help` says which folders are understood")
     by_label: dict[str, list[int]] = {label: [] for label in views.labels}
     for index, entry in enumerate(views.entries):
         by_label[entry.label].append(index)
     learned, held_out, instances = [], [], {}
     for number, (label, indices) in enumerate(by_label.items()):
-        rng = np.random.default_rng([config.seed, 1, number])
-        given, instances[label] = _given_away(views.entries, indices, config.held_out, rng)
+        rng = np.random.default_rng([seed, 1, number])
+        given, instances[label] = _given_away(views.entries, indices, share, rng)
         rest = [index for index in indices if index not in given]
-        learned += _spread(rest, config.views)
-        held_out += _spread(sorted(given) or rest, config.held_out_views)
+        learned += _spread(rest, most)
+        held_out += _spread(sorted(given) or rest, most_held_out)
     return Selection(tuple(sorted(learned)), tuple(sorted(held_out)), instances)
 
 

@@ -17,9 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from ...datasets.errors import InputError, UserError
+from ..datasets.errors import InputError, UserError
 
-REMEDY = "train a model with `thingmap train hog`, or say `hog` alone for the one that is shipped"
 _DOCUMENT = "document"
 
 
@@ -44,13 +43,19 @@ def write_document(path: Path, document: Mapping[str, Any], arrays: Mapping[str,
             temporary.unlink()
 
 
-def read_document(path: Path, schema: str) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+def read_document(path: Path, schema: str, kind: str, remedy: str) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """The document and the arrays of a file.
+
+    Args:
+        path: of the file.
+        schema: that it must have.
+        kind: what the file should be, for errors, such as "a HOG model".
+        remedy: what to do about another one.
 
     Raises:
         InputError: for no file, a broken one, one of another kind, or another schema.
     """
-    expected = f"a HOG model ({schema})"
+    expected = f"{kind} ({schema})"
     try:
         content = np.load(path, allow_pickle=False)
         if not isinstance(content, np.lib.npyio.NpzFile):
@@ -60,11 +65,11 @@ def read_document(path: Path, schema: str) -> tuple[dict[str, Any], dict[str, np
         document = json.loads(str(arrays.pop(_DOCUMENT)))
         found = document["schema"]
     except FileNotFoundError:
-        raise InputError(path, expected, "no such file", REMEDY) from None
+        raise InputError(path, expected, "no such file", remedy) from None
     except KeyError as error:
-        raise InputError(path, expected, f"no {error.args[0]!r} in it", REMEDY) from None
+        raise InputError(path, expected, f"no {error.args[0]!r} in it", remedy) from None
     except (OSError, EOFError, ValueError, TypeError, zipfile.BadZipFile, zlib.error) as error:
-        raise InputError(path, expected, " ".join(str(error).split()) or "a broken file", REMEDY) from None
+        raise InputError(path, expected, " ".join(str(error).split()) or "a broken file", remedy) from None
     if found != schema:
-        raise InputError(path, expected, repr(found), REMEDY)
+        raise InputError(path, expected, repr(found), remedy)
     return document, arrays

@@ -1,0 +1,1 @@
+"""What learning a detector needs, whatever the detector: which views and frames, and how they are kept."""
