@@ -31,4 +31,5 @@ def lidar_defaults() -> MapperConfig:
         association=replace(c.association, position_floor=0.1),  # m
         tracks=replace(c.tracks, process_sigma=0.03),  # m per keyframe
         cloud=replace(c.cloud, voxel_size=0.2, max_range=50.0),  # m
+        multiview=replace(c.multiview, far=50.0),  # m
     )

@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
 
 from .map.atomic import replacing
 from .map.object_map import PROBABLE, ObjectMap
 from .map.store import OutputFolder
 from .run_report import RunReport
 from .runner import Mapper
+
+
+@runtime_checkable
+class LabelsPoints(Protocol):
+    """A mapper that says what each point of its cloud is, such as `TrackMapper`.
+
+    `point_labels` gives (M,) indices into the map's classes for the points of `cloud()`, `NO_OBJECT` for none, or None
+    where it cannot tell.
+    """
+
+    def point_labels(self) -> np.ndarray | None: ...
 
 
 def save_run(
@@ -41,8 +54,18 @@ def save_run(
     folder.write_trajectory(*mapper.trajectory())
     folder.write_keyframes(*mapper.keyframes())
     folder.write_cloud(*mapper.cloud())
+    _save_labels(folder, mapper, object_map)
     with replacing(folder.ledger_file) as temporary:
         mapper.save_ledger(temporary)
     folder.write_report({**report.to_dict(), "command": command or {}, "mapper": mapper.statistics()})
     folder.write_map(object_map, include_doubtful)
     return object_map
+
+
+def _save_labels(folder: OutputFolder, mapper: Mapper, object_map: ObjectMap) -> None:
+    """The labels of the cloud's points; where the mapper gives none, none of an earlier run may pass for its own."""
+    labels = mapper.point_labels() if isinstance(mapper, LabelsPoints) else None
+    if labels is None:
+        folder.set_labels_aside()
+    else:
+        folder.write_labels(*mapper.cloud(), labels, object_map.classes)

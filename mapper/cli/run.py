@@ -23,6 +23,7 @@ class Inference(StrEnum):
 
     INCREMENTAL = "incremental"
     BATCH = "batch"
+    TRACKS = "tracks"
 
 
 DEFAULT_VIEWS = 12  # of batch inference; the most in Meger et al., Clutter, figure 8
@@ -46,7 +47,11 @@ def run(
     dataset: DatasetOption = None,
     config: Annotated[Path | None, typer.Option(metavar="FILE", help="YAML over the defaults.")] = None,
     inference: Annotated[
-        Inference, typer.Option(help="Frame by frame, or over a fixed set of views at the end.")
+        Inference,
+        typer.Option(
+            help="One graph, frame by frame; batch: over a fixed set of views at the end; tracks: no objects in the "
+            "graph, but detections linked by their places in space and Bayes' rule over views (best with masks)."
+        ),
     ] = Inference.INCREMENTAL,
     views: Annotated[
         int | None,
@@ -63,7 +68,8 @@ def run(
 ) -> None:
     """Map a sequence.
 
-    OUT gets map.json, evidence.npz, trajectory.txt, keyframes.npz, cloud.ply, config.yaml, report.json and ledger.npz.
+    OUT gets map.json, evidence.npz, trajectory.txt, keyframes.npz, cloud.ply, config.yaml, report.json and ledger.npz;
+    with --inference tracks and a detector that has masks also labels.ply, the cloud with a class for every point.
 
     Ctrl-C ends the run after the frame at hand and writes what is mapped so far.
     """
@@ -99,11 +105,21 @@ def run(
             "detector": spec,
             "stride": stride,
             "max_frames": max_frames,
-            **({"inference": inference.value, "views": views or DEFAULT_VIEWS} if inference is Inference.BATCH else {}),
+            **_inference_options(inference, views),
         },
         include_doubtful=include_doubtful,
         snapshots=parse_snapshot_frames(snapshots) if snapshots is not None else (),
     ).execute()
+
+
+def _inference_options(inference: Inference, views: int | None) -> dict[str, str | int]:
+    """What the report says of how things were found, unless it is the usual way."""
+    match inference:
+        case Inference.BATCH:
+            return {"inference": inference.value, "views": views or DEFAULT_VIEWS}
+        case Inference.TRACKS:
+            return {"inference": inference.value}
+    return {}
 
 
 def _make_mapper(
@@ -115,6 +131,10 @@ def _make_mapper(
         from ..proposals.views import spread_views
 
         return BatchMapper(detect, settings, views=spread_views(views or DEFAULT_VIEWS, len(frames)), **about)
+    if inference is Inference.TRACKS:
+        from ..multiview.track_mapper import TrackMapper
+
+        return TrackMapper(detect, settings, **about)
     from ..mapper import SemanticMapper
 
     return SemanticMapper(detect, settings, **about)

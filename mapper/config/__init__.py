@@ -11,6 +11,7 @@ from .evidence import BeliefConfig, EvidenceConfig, PresenceConfig
 from .keyframes import HybridConfig, KeyframeConfig, ScanConfig, SparseConfig, VisualConfig
 from .loops import ConstellationConfig, LoopConfig, PlaceConfig
 from .mapper import CloudConfig, MapperConfig
+from .multiview import MultiViewConfig
 from .odometry import FlowConfig, GicpConfig, LidarConfig, OdometryConfig, OdometrySource
 from .views import AssociationConfig, LiftingConfig, TrackConfig, UpConfig
 
@@ -31,6 +32,7 @@ __all__ = [
     "LiftingConfig",
     "LoopConfig",
     "MapperConfig",
+    "MultiViewConfig",
     "OdometryConfig",
     "OdometrySource",
     "PlaceConfig",

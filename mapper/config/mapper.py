@@ -9,6 +9,7 @@ from .batch import BatchConfig
 from .evidence import BeliefConfig, EvidenceConfig
 from .keyframes import HybridConfig, KeyframeConfig, ScanConfig, SparseConfig, VisualConfig
 from .loops import ConstellationConfig, LoopConfig, PlaceConfig
+from .multiview import MultiViewConfig
 from .odometry import OdometryConfig
 from .views import AssociationConfig, LiftingConfig, TrackConfig, UpConfig
 
@@ -47,4 +48,5 @@ class MapperConfig:
     lifecycle: LifecycleConfig = field(default_factory=LifecycleConfig)
     corrections: CorrectionConfig = field(default_factory=CorrectionConfig)
     batch: BatchConfig = field(default_factory=BatchConfig)
+    multiview: MultiViewConfig = field(default_factory=MultiViewConfig)
     cloud: CloudConfig = field(default_factory=CloudConfig)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,11 @@ import numpy as np
 
 from ...datasets.errors import InputError, UserError
 from .atomic import make_folder, replacing, write_atomic
+from .cloud_file import AGAIN, read_cloud, write_cloud, write_labels
 from .map_file import FILE_NAME as MAP_FILE
 from .object_map import ObjectMap
 from .views_file import evidence_path
 
-AGAIN = "write it again with `thingmap run`"
 TRAJECTORY_HEADER = "stamp tx ty tz qx qy qz qw: T_world_camera in seconds and metres"
 
 
@@ -86,6 +87,11 @@ class OutputFolder:
         return self.path / "cloud.ply"
 
     @property
+    def labels_file(self) -> Path:
+        """The cloud with a class for every point, where the mapper labels points."""
+        return self.path / "labels.ply"
+
+    @property
     def ledger_file(self) -> Path:
         """The mapper's measurements, from which its graph can be rebuilt."""
         return self.path / "ledger.npz"
@@ -116,15 +122,16 @@ class OutputFolder:
 
     def write_cloud(self, points: np.ndarray, colors: np.ndarray) -> None:
         """(M, 3) metres and (M, 3) uint8 RGB as binary PLY."""
-        from plyfile import PlyData, PlyElement
+        write_cloud(self.cloud_file, points, colors)
 
-        vertices = np.empty(len(points), dtype=[*((axis, "<f4") for axis in "xyz"), *_COLOR_FIELDS])
-        for column, axis in enumerate("xyz"):
-            vertices[axis] = points[:, column]
-        for column, (name, _) in enumerate(_COLOR_FIELDS):
-            vertices[name] = colors[:, column]
-        with replacing(self.cloud_file) as temporary:
-            PlyData([PlyElement.describe(vertices, "vertex")], byte_order="<").write(str(temporary))
+    def write_labels(self, points: np.ndarray, colors: np.ndarray, labels: np.ndarray, classes: Sequence[str]) -> None:
+        """The cloud with its labels; see `cloud_file.write_labels`. The evaluator reads it in place of the cloud."""
+        write_labels(self.labels_file, points, colors, labels, classes)
+
+    def set_labels_aside(self) -> None:
+        """Labels of an earlier run, which are not this map's, get another name."""
+        if self.labels_file.exists():
+            self.labels_file.replace(self.labels_file.with_name("labels.earlier.ply"))
 
     def write_keyframes(self, stamps: np.ndarray, T_world_camera: np.ndarray, covariance: np.ndarray) -> None:
         """(M,) seconds, (M, 4, 4) poses, (M, 6, 6) covariances in the pose's right tangent [rad, m], as an .npz."""
@@ -162,24 +169,14 @@ class OutputFolder:
         return rows[:, 0], poses
 
     def read_cloud(self) -> tuple[np.ndarray, np.ndarray]:
-        """(M, 3) float64 metres and (M, 3) uint8 RGB."""
-        from plyfile import PlyData, PlyParseError
-
-        try:
-            vertices = PlyData.read(str(self.cloud_file))["vertex"].data
-            points = np.stack([vertices[axis] for axis in "xyz"], axis=1).astype(np.float64)
-            return points, np.stack([vertices[name] for name, _ in _COLOR_FIELDS], axis=1)
-        except (OSError, KeyError, ValueError, PlyParseError) as error:
-            raise InputError(self.cloud_file, "a coloured cloud in PLY", str(error), AGAIN) from None
+        """(M, 3) float64 metres and (M, 3) uint8 RGB; raises `InputError` where the file is absent or damaged."""
+        return read_cloud(self.cloud_file)
 
     def read_report(self) -> dict[str, Any]:
         try:
             return json.loads(self.report_file.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             raise InputError(self.report_file, "a report in JSON", str(error), AGAIN) from None
-
-
-_COLOR_FIELDS = (("red", "u1"), ("green", "u1"), ("blue", "u1"))
 
 
 def _plain(value: Any) -> Any:

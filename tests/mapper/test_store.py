@@ -6,6 +6,7 @@ from plyfile import PlyData
 from scipy.spatial.transform import Rotation
 
 from thingmap.datasets.errors import InputError, UserError
+from thingmap.mapper.evaluation.inputs.load_run import load_run
 from thingmap.mapper.map.atomic import replacing, write_atomic
 from thingmap.mapper.map.store import OutputFolder
 from thingmap.mapper.run_report import RunReport
@@ -170,3 +171,48 @@ def test_reports_are_strict_json(tmp_path, report):
     )
     assert folder.read_report()["frames_per_second"] == 2.0
     assert folder.read_report()["mapper"] == {"rates": [1.0, None], "n": 3, "7": str(tmp_path)}
+
+
+class LabellingMapper:
+    """A mapper that says what its points are, in place of one that does not."""
+
+    def __init__(self, mapper, labels) -> None:
+        self._mapper, self._labels = mapper, labels
+
+    def __getattr__(self, name):
+        return getattr(self._mapper, name)
+
+    def point_labels(self):
+        return self._labels
+
+
+def mapped(tiny_sequence, fake_mapper):
+    mapper = fake_mapper()
+    for frame in tiny_sequence(3):
+        mapper.process_frame(frame)
+    return mapper
+
+
+def test_labels_of_points_are_read_back_by_the_evaluator(tmp_path, fake_mapper, tiny_sequence, report):
+    labels = np.array([1, -1, 0])
+    mapper = LabellingMapper(mapped(tiny_sequence, fake_mapper), labels)
+    save_run(OutputFolder.create(tmp_path), mapper, report, config="")
+    points, found = load_run(tmp_path).cloud()
+    np.testing.assert_array_equal(found, labels)
+    np.testing.assert_allclose(points, mapper.cloud()[0])
+    content = PlyData.read(str(tmp_path / "labels.ply"))
+    assert content.comments == ['label 1 "cup"', 'label 2 "bowl"']
+    assert content["vertex"]["label"].tolist() == [2, 0, 1] and content["vertex"]["red"].tolist() == [7, 7, 7]
+
+
+@pytest.mark.parametrize("can_label", [True, False])
+def test_labels_of_an_earlier_run_do_not_pass_for_those_of_this_one(
+    tmp_path, fake_mapper, tiny_sequence, report, can_label
+):
+    mapper = mapped(tiny_sequence, fake_mapper)
+    (tmp_path / "labels.ply").write_bytes(b"of another cloud")
+    folder = OutputFolder.create(tmp_path, overwrite=True)
+    save_run(folder, LabellingMapper(mapper, None) if can_label else mapper, report, config="")
+    assert not folder.labels_file.exists()
+    assert (tmp_path / "labels.earlier.ply").read_bytes() == b"of another cloud"
+    assert load_run(tmp_path).cloud()[1] is None

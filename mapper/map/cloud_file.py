@@ -1,0 +1,74 @@
+"""Coloured and labelled clouds as binary PLY."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ...datasets.errors import InputError
+from ...datasets.truth import NO_OBJECT
+from .atomic import replacing
+
+AGAIN = "write it again with `thingmap run`"
+COLOR_FIELDS = (("red", "u1"), ("green", "u1"), ("blue", "u1"))
+
+
+def write_cloud(file: Path, points: np.ndarray, colors: np.ndarray) -> None:
+    """(M, 3) metres and (M, 3) uint8 RGB."""
+    _write_vertices(file, _vertices(points, colors), [])
+
+
+def write_labels(
+    file: Path, points: np.ndarray, colors: np.ndarray, labels: np.ndarray, classes: Sequence[str]
+) -> None:
+    """A cloud with a class for every point.
+
+    Args:
+        file: to write.
+        points: (M, 3) metres, map frame.
+        colors: (M, 3) uint8 RGB.
+        labels: (M,) indices into `classes`, `NO_OBJECT` for none. In the file they are 0 for none and k + 1 for
+            class k, which a comment line names: `comment label 3 "cup"`.
+        classes: of the map.
+    """
+    vertices = _vertices(points, colors, ("label", "<i4"))
+    vertices["label"] = np.where(labels == NO_OBJECT, 0, labels + 1)
+    names = [f"label {number} {json.dumps(name)}" for number, name in enumerate(classes, start=1)]
+    _write_vertices(file, vertices, names)
+
+
+def read_cloud(file: Path) -> tuple[np.ndarray, np.ndarray]:
+    """(M, 3) float64 metres and (M, 3) uint8 RGB.
+
+    Raises:
+        InputError: the file is absent or damaged.
+    """
+    from plyfile import PlyData, PlyParseError
+
+    try:
+        vertices = PlyData.read(str(file))["vertex"].data
+        points = np.stack([vertices[axis] for axis in "xyz"], axis=1).astype(np.float64)
+        return points, np.stack([vertices[name] for name, _ in COLOR_FIELDS], axis=1)
+    except (OSError, KeyError, ValueError, PlyParseError) as error:
+        raise InputError(file, "a coloured cloud in PLY", str(error), AGAIN) from None
+
+
+def _vertices(points: np.ndarray, colors: np.ndarray, *more: tuple[str, str]) -> np.ndarray:
+    """(M,) records of (M, 3) points and (M, 3) colours, with more fields that are still empty."""
+    vertices = np.empty(len(points), dtype=[*((axis, "<f4") for axis in "xyz"), *COLOR_FIELDS, *more])
+    for column, axis in enumerate("xyz"):
+        vertices[axis] = points[:, column]
+    for column, (name, _) in enumerate(COLOR_FIELDS):
+        vertices[name] = colors[:, column]
+    return vertices
+
+
+def _write_vertices(file: Path, vertices: np.ndarray, comments: list[str]) -> None:
+    from plyfile import PlyData, PlyElement
+
+    with replacing(file) as temporary:
+        elements = [PlyElement.describe(vertices, "vertex")]
+        PlyData(elements, byte_order="<", comments=comments).write(str(temporary))
