@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
-
-from ..proposals.config import ProposalConfig
 
 ORIENTATIONS, ANGLES, RINGS = 4, 12, 3
 """Bins of a shape context: orientation of the edge, direction and distance of its points (section III-A)."""
@@ -54,11 +52,3 @@ class VotingConfig:
     maxima: int = 2
     min_score: float = 0.3
     min_iou: float = 0.5
-
-
-@dataclass(frozen=True, slots=True)
-class ShapeContextConfig:
-    """Everything together; what a detector does beside its model."""
-
-    proposals: ProposalConfig = field(default_factory=ProposalConfig)
-    voting: VotingConfig = field(default_factory=VotingConfig)

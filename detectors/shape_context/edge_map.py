@@ -37,5 +37,5 @@ class EdgeMap:
         """The points that a (E,) bool mask names."""
         counts = np.bincount(self.rows[keep], minlength=self.shape[0])
         start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-        arrays = (self.columns, self.rows), (self.orientation, self.depth, self.is_depth)
-        return EdgeMap(self.shape, *(a[keep] for a in arrays[0]), start, *(a[keep] for a in arrays[1]))
+        rest = self.orientation[keep], self.depth[keep], self.is_depth[keep]
+        return EdgeMap(self.shape, self.columns[keep], self.rows[keep], start, *rest)
