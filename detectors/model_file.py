@@ -73,3 +73,12 @@ def read_document(path: Path, schema: str, kind: str, remedy: str) -> tuple[dict
     if found != schema:
         raise InputError(path, expected, repr(found), remedy)
     return document, arrays
+
+
+def schema_of(path: Path) -> str:
+    """The `schema` of a file that `write_document` wrote; empty for none, or any other file."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return str(json.loads(str(file[_DOCUMENT]))["schema"])
+    except (OSError, EOFError, KeyError, TypeError, ValueError, AttributeError, zipfile.BadZipFile, zlib.error):
+        return ""

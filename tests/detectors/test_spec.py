@@ -21,6 +21,11 @@ from thingmap.detectors.onnx import OnnxDetector
 from thingmap.detectors.onnx.outputs import OutputFamily
 from thingmap.detectors.proposals.detector import ProposalDetector
 from thingmap.detectors.recorded import RecordedDetections, RecordedFormat, write_detections
+from thingmap.detectors.shape_context.calibration import Calibration
+from thingmap.detectors.shape_context.codebook import Codebook
+from thingmap.detectors.shape_context.config import LENGTH, VotingConfig
+from thingmap.detectors.shape_context.detector import ShapeContextDetector
+from thingmap.detectors.shape_context.model import ShapeContextModel
 from thingmap.detectors.simulated_config import SimulatedDetectorConfig
 from thingmap.detectors.spec import make_detector
 
@@ -40,6 +45,18 @@ def test_onnx_with_options(model: Path):
     assert make_detector(f"{model}?names={model.parent / 'names.txt'}&size=64&family=yolov8").family == (  # type: ignore[attr-defined]
         OutputFamily.YOLOV8.value
     )
+
+
+def test_shape_context_with_options(tmp_path: Path, make_frame):
+    book = Codebook(np.eye(2, LENGTH), np.zeros((2, 2)), np.ones((2, 2)), 0.1, 50.0, 5.0, 2e-3)
+    certain = Calibration(np.ones(1), np.zeros(1), np.zeros(1))
+    file = tmp_path / "mugs.npz"
+    ShapeContextModel(("mug",), (book,), certain, VotingConfig(), {}).save(file)
+    detector = make_detector(f"shape-context:{file}?confidence=0.3&max=7")
+    assert isinstance(detector, ShapeContextDetector) and detector.classes == ("mug",)
+    assert (detector.confidence, detector.max_detections) == (0.3, 7)
+    assert len(detector(make_frame())) == 0
+    assert isinstance(make_detector(str(file)), ShapeContextDetector)  # the file says what it is for
 
 
 @pytest.fixture
@@ -151,7 +168,7 @@ def test_none(make_frame):
     [
         (
             "yolo:a.pt",
-            "there is no 'yolo'; there are onnx:PATH, hog\\[:PATH\\], proposals, recorded:PATH, simulated, none",
+            "there is no 'yolo'; there are onnx:PATH, hog.*, recorded:PATH, simulated, none",
         ),
         ("a.pt", "there is no 'a.pt'; there are"),
         ("", "there is no ''; there are"),
