@@ -1,7 +1,11 @@
-"""Small maps, a small sequence and a mapper that does nothing, for tests of what surrounds the mapper."""
+"""Small maps, a small sequence and a mapper that does nothing, for tests of what surrounds the mapper; the sample.
+
+Tests import `lasting_world`, `jumping_camera` and `sample_maps` from their own folder.
+"""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,8 +14,13 @@ import numpy as np
 import pytest
 
 from thingmap.datasets.frame import BrokenFrame, Frame, FrameProblem, Intrinsics
+from thingmap.datasets.synthetic.sample import TabletopSequence, open_sample
+from thingmap.detectors.detections import Detections
+from thingmap.detectors.simulated import SimulatedDetector
 from thingmap.mapper.map.object_map import MapFrame, ObjectMap, UpDirection
 from thingmap.mapper.map.thing import Evidence, Thing
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 UP_IN_FIRST_CAMERA = np.array([0.0, -1.0, 0.0])
 
@@ -150,3 +159,22 @@ def tiny_sequence() -> type[TinySequence]:
 def fake_mapper() -> type[FakeMapper]:
     """The class `FakeMapper`."""
     return FakeMapper
+
+
+@pytest.fixture(scope="session")
+def sample() -> TabletopSequence:
+    """The rendered sample, small."""
+    return open_sample("tabletop?frames=80&width=320")
+
+
+@pytest.fixture(scope="session")
+def sample_frames(sample: TabletopSequence) -> list[Frame]:
+    """Twenty of its frames; treat as read-only."""
+    return [sample[i] for i in range(0, 80, 4)]
+
+
+@pytest.fixture(scope="session")
+def sample_detections(sample: TabletopSequence, sample_frames: list[Frame]) -> list[Detections]:
+    """What the simulated detector finds in them."""
+    detector = SimulatedDetector(sample)
+    return [detector(frame) for frame in sample_frames]

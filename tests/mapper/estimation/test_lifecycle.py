@@ -1,40 +1,24 @@
-"""Birth, marriage and death of landmarks."""
+"""Birth and death of landmarks, and how often they are refreshed in between."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from lives import BOWL, CUP, NOTHING, cup, empty, follow, twins
+from rooms import KINECT
+from stages import Stage, Thing
 
 from thingmap.mapper.config import MapperConfig, TrackConfig
-from thingmap.mapper.estimation.landmarks import volume_overlaps
 from thingmap.mapper.estimation.ledger import Ledger
 from thingmap.mapper.estimation.outcomes import Outcome
-from thingmap.mapper.estimation.records import DepthCentre, Look, Merge, NewLandmark, Retire, Scores
+from thingmap.mapper.estimation.records import DepthCentre, Look, NewLandmark, Retire, Scores
 from thingmap.mapper.estimation.size_site import propagate
 from thingmap.mapper.estimation.smoother import Smoother
 
-CUP, BOWL, NOTHING = (0.6, 0.1, 0.02), (0.1, 0.6, 0.02), (0.12, 0.1, 0.02)
-BACK = 3.0  # m, a distance from which everything looks new after 2 m
 
-
-def cup(tools, x: float = 0.0, **kwargs):
-    return tools.Thing((x, 0.0, 0.0), **{"scores": CUP, **kwargs})
-
-
-def follow(stage, *things, places=(-0.6, -0.4, -0.2, 0.0, 0.2, 0.4), pull: float = 2.0):
-    for x in places:
-        stage.show(x, *things, pull=pull)
-    return stage
-
-
-def empty(stage):
-    """The things are taken away, which the camera sees from places where it has not been."""
-    return follow(stage, places=np.linspace(-1.2, 1.2, 8), pull=BACK)
-
-
-def test_a_detection_starts_a_candidate(tools):
-    stage = tools.Stage()
-    view = stage.show(0.0, cup(tools))
+def test_a_detection_starts_a_candidate():
+    stage = Stage()
+    view = stage.show(0.0, cup())
     (track,) = stage.scene.tracks
     assert track.number == 1 and track.hits == {0} and not track.misses
     assert track.first_seen == track.last_seen == view.frame.stamp
@@ -44,10 +28,10 @@ def test_a_detection_starts_a_candidate(tools):
     assert stage.outcomes[Outcome.NEW_TRACK] == 1
 
 
-def test_the_third_hit_makes_a_landmark(tools):
-    stage = tools.Stage()
+def test_the_third_hit_makes_a_landmark():
+    stage = Stage()
     for promoted, x in zip((0, 0, 1, 1), (-0.4, -0.2, 0.0, 0.2), strict=True):
-        stage.show(x, cup(tools))
+        stage.show(x, cup())
         assert stage.outcomes[Outcome.PROMOTED] == promoted
     assert stage.scene.tracks == [] and list(stage.scene.landmarks) == [1]
     landmark = stage.scene.landmarks[1]
@@ -57,67 +41,67 @@ def test_the_third_hit_makes_a_landmark(tools):
     np.testing.assert_allclose(landmark.half_axes[[0, 2]], 0.1, rtol=0.1)
 
 
-def test_what_is_probably_an_object_is_a_landmark_at_once(tools):
+def test_what_is_probably_an_object_is_a_landmark_at_once():
     """Unless only hits are to decide, one good look is enough; a doubtful one is not."""
     quick = MapperConfig(tracks=TrackConfig(min_existence=0.6))
     for scores, landmarks in ((CUP, 1), (NOTHING, 0)):
-        stage = follow(tools.Stage(quick), cup(tools, scores=scores), places=(0.0,))
+        stage = follow(Stage(quick), cup(scores=scores), places=(0.0,))
         assert len(stage.scene.landmarks) == landmarks and len(stage.scene.tracks) == 1 - landmarks
-    (landmark,) = follow(tools.Stage(quick), cup(tools), places=(0.0,)).scene.landmarks.values()
+    (landmark,) = follow(Stage(quick), cup(), places=(0.0,)).scene.landmarks.values()
     assert landmark.measurements == 1 and landmark.supporting == {0}
 
 
-def test_the_past_of_a_candidate_is_in_the_ledger(tools):
-    stage = follow(tools.Stage(), cup(tools), places=(-0.4, -0.2, 0.0))
+def test_the_past_of_a_candidate_is_in_the_ledger():
+    stage = follow(Stage(), cup(), places=(-0.4, -0.2, 0.0))
     kinds = [type(record) for record in stage.smoother.ledger]
     assert kinds.count(NewLandmark) == 1 and kinds.count(Scores) == 3 and kinds.count(DepthCentre) == 3
-    stage.show(0.2, cup(tools))
+    stage.show(0.2, cup())
     assert [r.keyframe for r in stage.smoother.ledger if isinstance(r, Look)] == [3]  # looks are of landmarks
 
 
-def test_numbers_are_never_used_twice(tools):
-    stage = empty(follow(tools.Stage(), cup(tools)))
+def test_numbers_are_never_used_twice():
+    stage = empty(follow(Stage(), cup()))
     assert list(stage.scene.retired) == [1]
-    follow(stage, cup(tools))
+    follow(stage, cup())
     assert list(stage.scene.landmarks) == [2] and list(stage.scene.retired) == [1]
 
 
-def test_a_candidate_that_is_missed_is_dropped(tools):
+def test_a_candidate_that_is_missed_is_dropped():
     """A false box on the wall: the wall stays, the box does not come again."""
-    stage = tools.Stage()
-    stage.show(0.0, tools.Thing((0.0, 2.0, 0.0), scores=NOTHING, there=False))
+    stage = Stage()
+    stage.show(0.0, Thing((0.0, 2.0, 0.0), scores=NOTHING, there=False))
     follow(stage, places=np.linspace(-0.5, 0.5, stage.config.tracks.max_misses))
     assert stage.scene.tracks == [] and stage.scene.landmarks == {}
     assert stage.outcomes[Outcome.REJECTED_MISSED] == 1
 
 
-def test_a_candidate_that_is_seen_through_is_dropped_for_that(tools):
-    stage = tools.Stage()
-    stage.show(0.0, cup(tools))
+def test_a_candidate_that_is_seen_through_is_dropped_for_that():
+    stage = Stage()
+    stage.show(0.0, cup())
     follow(stage, places=np.linspace(-0.5, 0.5, stage.config.tracks.max_misses))
     assert stage.outcomes[Outcome.REJECTED_FREE_SPACE] == 1 and stage.scene.tracks == []
 
 
-def test_two_things_are_two_landmarks(tools):
-    stage = follow(tools.Stage(), cup(tools, -0.3), tools.Thing((0.3, 0.0, 0.0), scores=BOWL))
+def test_two_things_are_two_landmarks():
+    stage = follow(Stage(), cup(-0.3), Thing((0.3, 0.0, 0.0), scores=BOWL))
     a, b = stage.scene.landmarks.values()
     assert [stage.CLASSES[int(np.argmax(x.belief.class_posterior()))] for x in (a, b)] == ["cup", "bowl"]
     assert a.belief.existence > 0.95 and b.belief.existence > 0.95
     assert stage.outcomes[Outcome.MERGED] == 0
 
 
-def test_size_decides_between_classes_that_score_alike(tools):
+def test_size_decides_between_classes_that_score_alike():
     """Named cup and monitor alike; once as large as a cup, once as a monitor."""
     for half_axes, label in (((0.045, 0.045, 0.05), "cup"), ((0.26, 0.1, 0.2), "monitor")):
-        stage = follow(tools.Stage(), tools.Thing((0.0, 0.0, 0.0), half_axes, (0.4, 0.02, 0.4)))
+        stage = follow(Stage(), Thing((0.0, 0.0, 0.0), half_axes, (0.4, 0.02, 0.4)))
         (landmark,) = stage.scene.landmarks.values()
         posterior = dict(zip(stage.CLASSES, landmark.belief.class_posterior(), strict=True))
         assert posterior[label] > 0.9
 
 
-def test_beliefs_and_sites_agree_with_the_graph(tools):
+def test_beliefs_and_sites_agree_with_the_graph():
     """After `refresh_fully` and an update, another propagation step has nothing left to change."""
-    stage = follow(tools.Stage(), cup(tools), places=np.linspace(-0.8, 0.8, 12))
+    stage = follow(Stage(), cup(), places=np.linspace(-0.8, 0.8, 12))
     (landmark,) = stage.scene.landmarks.values()
     smoother = stage.smoother
     for _ in range(6):
@@ -133,9 +117,9 @@ def test_beliefs_and_sites_agree_with_the_graph(tools):
     np.testing.assert_allclose(result.posterior, belief.posterior, atol=0.01)
 
 
-def test_a_full_refresh_reads_the_graph_as_it_is(tools):
+def test_a_full_refresh_reads_the_graph_as_it_is():
     """A site was replaced and solved since the last refresh: mean and covariance have to be of the same moment."""
-    stage = follow(tools.Stage(), cup(tools), places=(-0.4, -0.2, 0.0))
+    stage = follow(Stage(), cup(), places=(-0.4, -0.2, 0.0))
     (landmark,) = stage.scene.landmarks.values()
     site = stage.smoother.sites[1]
     stage.smoother.set_site(1, type(site)(site.mean + 1.0, 4.0 * site.information))
@@ -147,86 +131,8 @@ def test_a_full_refresh_reads_the_graph_as_it_is(tools):
     np.testing.assert_allclose(landmark.belief.posterior, expected.posterior, atol=1e-9)
 
 
-def twins(tools, gap: float, half_axes=(0.1, 0.1, 0.1)):
-    """Landmarks 1 and 2 of one thing, `gap` metres apart, each from its own keyframes; `merge` not yet asked."""
-    stage = tools.Stage()
-    stage.lifecycle.merge = lambda: None  # type: ignore[method-assign]
-    for x, thing in ((0.0, cup(tools, 0.0, half_axes=half_axes)), (gap, cup(tools, gap, half_axes=half_axes))):
-        for place in (-0.4, -0.2, 0.0):
-            before = list(stage.scene.landmarks.values())
-            stage.scene.landmarks.clear()  # what is not in the scene is not associated
-            stage.show(place + x, thing)
-            for landmark in before:
-                stage.scene.landmarks[landmark.number] = landmark
-    del stage.lifecycle.merge
-    assert sorted(stage.scene.landmarks) == [1, 2]
-    return stage
-
-
-def test_two_landmarks_at_one_place_become_one(tools):
-    stage = twins(tools, 0.02)
-    a, b = stage.scene.landmarks[1], stage.scene.landmarks[2]
-    places = a.position[0], b.position[0]
-    hits, measurements, seen = (
-        (a.belief.hits, b.belief.hits),
-        a.measurements + b.measurements,
-        a.supporting | b.supporting,
-    )
-    stage.lifecycle.merge()
-    assert list(stage.scene.landmarks) == [1] and stage.smoother.owner(2) == 1
-    assert (a.measurements, a.supporting) == (measurements, seen)
-    assert max(hits) < a.belief.hits < sum(hits)  # both were seen from about the same places
-    stage.smoother.update()
-    stage.lifecycle.refresh(set())
-    assert places[0] + 0.005 < stage.smoother.position(1)[0] < places[1] - 0.005
-    assert stage.outcomes[Outcome.MERGED] == 1
-    assert any(isinstance(r, Merge) and (r.kept, r.absorbed) == (1, 2) for r in stage.smoother.ledger)
-
-
-def test_neighbours_stay_two(tools):
-    stage = twins(tools, 0.25)
-    stage.lifecycle.merge()
-    assert sorted(stage.scene.landmarks) == [1, 2]
-
-
-def test_a_thing_in_the_middle_of_a_larger_one_stays_itself(tools):
-    stage = tools.Stage()
-    stage.lifecycle.merge = lambda: None  # type: ignore[method-assign]
-    for half_axes in ((0.4, 0.3, 0.3), (0.05, 0.05, 0.05)):
-        before = dict(stage.scene.landmarks)
-        stage.scene.landmarks.clear()
-        follow(stage, tools.Thing((0.0, 0.0, 0.0), half_axes, CUP), places=(-0.4, -0.2, 0.0))
-        stage.scene.landmarks.update(before)
-    del stage.lifecycle.merge
-    stage.lifecycle.merge()
-    assert sorted(stage.scene.landmarks) == [1, 2]
-
-
-def test_merging_asks_the_joint_covariance(tools):
-    """Two tall things, one a hand above the other, seen from a pose unknown to half a metre. Each position is as
-    unsure as the pose, so a test without the cross term takes them for one; seen together, they are surely two."""
-    stage = tools.Stage()
-    stage.lifecycle.merge = lambda: None  # type: ignore[method-assign]
-    stage.show(0.0)  # holds the world
-    loose, add_keyframe = np.diag(np.repeat([1e-4, 0.5**2], 3)), stage.smoother.add_keyframe
-    stage.smoother.add_keyframe = lambda T, _: add_keyframe(T, loose)  # type: ignore[method-assign]
-    pair = [tools.Thing((0.0, 0.0, z), (0.05, 0.05, 0.3), CUP) for z in (-0.2, 0.2)]
-    stage.show(-0.4, *pair)
-    stage.smoother.add_keyframe = add_keyframe  # type: ignore[method-assign]
-    follow(stage, *pair, places=np.linspace(-0.3, 0.4, 8))
-    a, b = stage.scene.landmarks.values()
-    smoother, config, apart = stage.smoother, stage.config.lifecycle, a.position - b.position
-    assert volume_overlaps([a, b], np.eye(3))[0, 1] > config.merge_overlap
-    joint = smoother.difference_covariance(1, 2)
-    alone = smoother.position_covariance(1) + smoother.position_covariance(2)
-    assert apart @ np.linalg.solve(alone, apart) < 1.0 and apart @ np.linalg.solve(joint, apart) > 100.0
-    del stage.lifecycle.merge
-    stage.lifecycle.merge()
-    assert sorted(stage.scene.landmarks) == [1, 2]
-
-
-def test_retired_landmarks_leave_the_graph_and_stay_known(tools):
-    stage = follow(tools.Stage(), cup(tools))
+def test_retired_landmarks_leave_the_graph_and_stay_known():
+    stage = follow(Stage(), cup())
     landmark = stage.scene.landmarks[1]
     empty(stage)
     assert stage.scene.landmarks == {} and stage.scene.retired == {1: landmark}
@@ -236,8 +142,8 @@ def test_retired_landmarks_leave_the_graph_and_stay_known(tools):
     assert [record.landmark for record in stage.smoother.ledger if isinstance(record, Retire)] == [1]
 
 
-def test_nothing_retires_before_it_was_looked_at_often_enough(tools):
-    stage = follow(tools.Stage(), cup(tools), places=(-0.4, -0.2, 0.0))
+def test_nothing_retires_before_it_was_looked_at_often_enough():
+    stage = follow(Stage(), cup(), places=(-0.4, -0.2, 0.0))
     landmark = stage.scene.landmarks[1]
     belief, views = landmark.belief, stage.config.lifecycle.retire_views
     assert belief.effective_views < views - 0.1
@@ -253,16 +159,16 @@ def test_nothing_retires_before_it_was_looked_at_often_enough(tools):
     assert list(stage.scene.landmarks) == []
 
 
-def test_the_graph_of_a_whole_life_can_be_rebuilt(tools, tmp_path):
-    stage = twins(tools, 0.02)
-    follow(stage, tools.Thing((0.5, 0.0, 0.0), scores=BOWL))
+def test_the_graph_of_a_whole_life_can_be_rebuilt(tmp_path):
+    stage = twins(0.02)
+    follow(stage, Thing((0.5, 0.0, 0.0), scores=BOWL))
     empty(stage)
-    follow(stage, cup(tools))
+    follow(stage, cup())
     assert stage.outcomes[Outcome.MERGED] >= 1 and stage.outcomes[Outcome.RETIRED] >= 1
     stage.smoother.settle()
     stage.smoother.ledger.save(tmp_path / "ledger.npz")
     ledger, _ = Ledger.load(tmp_path / "ledger.npz")
-    loaded = Smoother.from_ledger(ledger, stage.config.smoother, tools.kinect)
+    loaded = Smoother.from_ledger(ledger, stage.config.smoother, KINECT)
     assert loaded.sites.keys() == stage.smoother.sites.keys() == stage.scene.landmarks.keys()
     for j in loaded.sites:
         np.testing.assert_allclose(loaded.position(j), stage.smoother.position(j), atol=0.01)
@@ -286,28 +192,9 @@ def refreshed(stage, settling: bool, measured: bool, keyframes: int) -> int:
 @pytest.mark.parametrize(
     ("settling", "measured", "expected"), [(True, True, 10), (True, False, 2), (False, True, 3), (False, False, 0)]
 )
-def test_landmarks_are_refreshed_when_measured_and_settle_slowly_otherwise(tools, settling, measured, expected):
+def test_landmarks_are_refreshed_when_measured_and_settle_slowly_otherwise(settling, measured, expected):
     """Every third measurement of what was measured often; every one while it is settling; else every fifth keyframe."""
-    stage = follow(tools.Stage(), cup(tools), places=np.linspace(-0.8, 0.8, 12))
+    stage = follow(Stage(), cup(), places=np.linspace(-0.8, 0.8, 12))
     (landmark,) = stage.scene.landmarks.values()
     landmark.measurements = landmark.refreshed_at = 12
     assert refreshed(stage, settling, measured, 10) == expected
-
-
-def test_what_was_measured_twice_is_not_merged_before_more_views_had_their_chance(tools):
-    stage = twins(tools, 0.02)
-    stage.scene.landmarks[2].measurements = 2
-    stage.lifecycle.merge()
-    assert sorted(stage.scene.landmarks) == [1, 2]
-    for x in np.linspace(3.0, 4.0, 20):  # looks away; nothing is to be waited for any more
-        stage.view(x)
-    stage.smoother.update()
-    stage.lifecycle.merge()
-    assert sorted(stage.scene.landmarks) == [1]
-
-
-def test_where_all_views_were_seen_few_measurements_are_merged_too(tools):
-    stage = twins(tools, 0.02)
-    stage.scene.landmarks[2].measurements = 2
-    stage.lifecycle.merge(all_seen=True)
-    assert sorted(stage.scene.landmarks) == [1]

@@ -95,3 +95,9 @@ def test_platt_is_calibrated_and_finite():
     assert fit_platt(score[right], score[~right], np.zeros(2)) == pytest.approx([-8.0, 3.0], abs=0.25)
     assert np.isfinite(fit_platt(np.array([0.9, 0.8]), np.array([0.1]), np.zeros(2))).all()
     assert fit_platt(np.array([0.9]), np.zeros(0), np.array([1.0, 2.0])).tolist() == [1.0, 2.0]
+
+
+def test_platt_of_scores_that_say_less_than_nothing_is_the_share_of_right_ones():
+    A, B = fit_platt(np.full(30, 0.2), np.full(10, 0.8), np.zeros(2))
+    assert A == 0.0
+    assert 1.0 / (1.0 + np.exp(B)) == pytest.approx(0.75, abs=0.02)
