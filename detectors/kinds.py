@@ -50,7 +50,7 @@ def _make_proposals(path: str, sequence: Sequence | None, options: dict[str, Any
 def _make_shape_context(path: str, sequence: Sequence | None, options: dict[str, Any]) -> Detector:
     from .shape_context.detector import ShapeContextDetector
 
-    return ShapeContextDetector(path, **options)
+    return ShapeContextDetector(path or None, **options)
 
 
 def _make_recorded(path: str, sequence: Sequence | None, options: dict[str, Any]) -> Detector:
@@ -123,8 +123,8 @@ KINDS = {
         {"confidence": ("confidence", float), "max": ("max_detections", int), "edge": ("edge", _switch)},
     ),
     "shape-context": Kind(
-        "shape-context:PATH",
-        True,
+        "shape-context[:PATH]",
+        None,
         _make_shape_context,
         {"confidence": ("confidence", float), "max": ("max_detections", int)},
     ),

@@ -1,18 +1,18 @@
 """Detectors by a line of text, as the command line and configuration files name them.
 
-    onnx:PATH           names=FILE confidence=0.1 nms=0.5 max=100 backend=opencv size=640x480 family=yolox-decoded
-    hog[:PATH]          confidence=0.1 nms=0.4 max=100 parts=0 merge=0
-    proposals           confidence=0.5 max=100 edge=1
-    shape-context:PATH  confidence=0.1 max=100
-    recorded:PATH       format=coco names=FILE label=cabinet images=FILE
-    simulated           seed=1 parts=1 max_recall=0.96 background_spots=5 chance_rate=0.12 ...
+    onnx:PATH             names=FILE confidence=0.1 nms=0.5 max=100 backend=opencv size=640x480 family=yolox-decoded
+    hog[:PATH]            confidence=0.1 nms=0.4 max=100 parts=0 merge=0
+    proposals             confidence=0.5 max=100 edge=1
+    shape-context[:PATH]  confidence=0.5 max=100
+    recorded:PATH         format=coco names=FILE label=cabinet images=FILE
+    simulated             seed=1 parts=1 max_recall=0.96 background_spots=5 chance_rate=0.12 ...
     none
 
 Options follow a question mark: `onnx:model.onnx?confidence=0.2&backend=opencv`. `OnnxDetector`, `HogDetector`,
 `ProposalDetector`, `ShapeContextDetector` and `RecordedDetections` explain them; those of `simulated` are the seed and
 the numbers of `SimulatedDetectorConfig`.
-`hog` alone is the shipped model of the synthetic world's things. A path alone is `onnx:` when it ends in .onnx,
-`recorded:` when it is a .json file or a folder, and for an .npz what the model in it is for.
+`hog` and `shape-context` alone are the shipped models of the synthetic world's things. A path alone is `onnx:` when it
+ends in .onnx, `recorded:` when it is a .json file or a folder, and for an .npz what the model in it is for.
 """
 
 from __future__ import annotations

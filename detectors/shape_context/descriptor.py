@@ -16,7 +16,11 @@ _ROUNDING = 1e-9  # of a bin: diagonals lie on limits of the angles, and go to t
 
 
 def shape_contexts(
-    edges: EdgeMap, points: np.ndarray, radius: np.ndarray, owner: np.ndarray | None = None
+    edges: EdgeMap,
+    points: np.ndarray,
+    radius: np.ndarray,
+    owner: np.ndarray | None = None,
+    turn: np.ndarray | None = None,
 ) -> np.ndarray:
     """Descriptors of some of the points of an edge map: shares of their neighbours by orientation, direction and ring.
 
@@ -35,6 +39,8 @@ def shape_contexts(
         points: (S,) integers, which of them are described.
         radius: (S,) float32 pixels, r of every one.
         owner: (E,) integers, what every point belongs to; only points of the same owner are neighbours. None: all are.
+        turn: (S,) radians, how far what each point is on is turned in the image, from x towards y; it is described as
+            if turned back. None: not at all.
 
     Returns:
         (S, LENGTH) float32, rows that add up to 1; rows of zeros where nothing is within the radius.
@@ -49,22 +55,25 @@ def shape_contexts(
         raise ValueError("radius must be positive numbers")
     if ((points < 0) | (points >= len(edges))).any():
         raise ValueError(f"points must be from 0 to {len(edges) - 1}, but are {points.min()} to {points.max()}")
+    turn = np.zeros(len(points)) if turn is None else np.asarray(turn, dtype=np.float64)
+    if turn.shape != points.shape or not np.isfinite(turn).all():
+        raise ValueError(f"turn must be (S,) finite numbers, but got shape {turn.shape}")
     if owner is not None and owner.shape != (len(edges),):
         raise ValueError(f"owner must be ({len(edges)},), but got shape {owner.shape}")
     if len(points) == 0:
         return np.zeros((0, LENGTH), dtype=np.float32)
-    bins = np.floor(edges.orientation * (ORIENTATIONS / np.pi) + 0.5).astype(np.int64) % ORIENTATIONS
+    orientation = edges.orientation.astype(np.float64) * (ORIENTATIONS / np.pi) + 0.5
     reach = math.floor(float(radius.max()))
-    angles = _angle_bins(min(reach, edges.shape[0] - 1), min(reach, edges.shape[1] - 1))
+    angles = _angles(min(reach, edges.shape[0] - 1), min(reach, edges.shape[1] - 1))
     same = np.zeros(len(edges), dtype=np.int32) if owner is None else owner.astype(np.int32)
-    return _count(edges.rows, edges.columns, edges.row_start, bins * ANGLES, same, points, radius, angles)
+    return _count(edges.rows, edges.columns, edges.row_start, orientation, same, points, radius, turn, angles)
 
 
-def _angle_bins(rows: int, columns: int) -> np.ndarray:
-    """(2 rows + 1, 2 columns + 1) int64, the angle bin of an offset of (y - rows, x - columns) pixels."""
+def _angles(rows: int, columns: int) -> np.ndarray:
+    """(2 rows + 1, 2 columns + 1), the direction of an offset of (y - rows, x - columns) pixels: bin and part of it."""
     y, x = np.arange(-rows, rows + 1), np.arange(-columns, columns + 1)
     turns = np.arctan2(y[:, None], x[None, :]) / (2.0 * np.pi)
-    return np.floor(turns * ANGLES + 0.5 + _ROUNDING).astype(np.int64) % ANGLES
+    return turns * ANGLES + 0.5 + _ROUNDING
 
 
 @njit(cache=True, nogil=True)
@@ -76,6 +85,7 @@ def _count(
     owner: np.ndarray,
     points: np.ndarray,
     radius: np.ndarray,
+    turn: np.ndarray,
     angles: np.ndarray,
 ) -> np.ndarray:
     result = np.zeros((len(points), LENGTH), dtype=np.float32)
@@ -86,6 +96,8 @@ def _count(
         x, y, mine = int(columns[point]), int(rows[point]), owner[point]
         inner, outer = r2 * _RING_LIMITS[0] ** 2, r2 * _RING_LIMITS[1] ** 2
         reach = int(radius[s])
+        back_angle = turn[s] * (ANGLES / (2.0 * math.pi))
+        back_orientation = turn[s] * (ORIENTATIONS / math.pi)
         counts[:] = 0
         for row in range(max(y - reach, 0), min(y + reach, last_row) + 1):
             dy = row - y
@@ -99,7 +111,9 @@ def _count(
                     continue
                 d2 = dx * dx + dy * dy
                 ring = int(d2 > inner) + int(d2 > outer)
-                counts[(orientation[e] + angles[dy + middle_y, dx + middle_x]) * RINGS + ring] += 1
+                o = math.floor(orientation[e] - back_orientation) % ORIENTATIONS
+                a = math.floor(angles[dy + middle_y, dx + middle_x] - back_angle) % ANGLES
+                counts[(o * ANGLES + a) * RINGS + ring] += 1
                 total += 1
         if total > 0:
             for k in range(LENGTH):

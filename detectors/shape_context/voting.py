@@ -18,12 +18,14 @@ class Voters:
         depth: (S,) metres.
         owner: (S,) int32, proposal.
         weight: (S,) edge points that each stands for.
+        turn: (S,) radians from x towards y, how far what is upright there is turned in the image.
     """
 
     xy: np.ndarray
     depth: np.ndarray
     owner: np.ndarray
     weight: np.ndarray
+    turn: np.ndarray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +57,7 @@ class Votes:
 def cast_votes(
     voters: Voters, index: np.ndarray, distance: np.ndarray, codebook: Codebook, focal: float, bandwidth: float
 ) -> Votes:
-    """The votes of all matches, at l_i + q_i z_t / z_l (section III-A).
+    """The votes of all matches, at l_i + q_i z_t / z_l (section III-A), where q_i turns with the camera.
 
     A vote weighs exp(-chi^2 / bandwidth) / K, times the edge points that its voter stands for, times z_l / z_t of the
     same focal length: contours are longer in pixels the nearer they are, so the votes for one object add up to the
@@ -76,8 +78,10 @@ def cast_votes(
     scale = pixels[voter, None]
     agreement = np.exp(-distance / bandwidth) / max(k, 1)
     at_training = voters.weight / (pixels * codebook.depth)
+    right, down = codebook.offsets[flat].T
+    c, s = np.cos(voters.turn)[voter], np.sin(voters.turn)[voter]
     return Votes(
-        xy=voters.xy[voter] + codebook.offsets[flat] * scale,
+        xy=voters.xy[voter] + np.stack([c * right - s * down, s * right + c * down], axis=1) * scale,
         size=codebook.sizes[flat] * scale,
         weight=(agreement * at_training[:, None]).ravel(),
         group=voters.owner[voter],

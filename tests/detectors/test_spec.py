@@ -21,7 +21,7 @@ from thingmap.detectors.onnx import OnnxDetector
 from thingmap.detectors.onnx.outputs import OutputFamily
 from thingmap.detectors.proposals.detector import ProposalDetector
 from thingmap.detectors.recorded import RecordedDetections, RecordedFormat, write_detections
-from thingmap.detectors.shape_context.calibration import Calibration
+from thingmap.detectors.shape_context.calibration import FEATURES, Calibration
 from thingmap.detectors.shape_context.codebook import Codebook
 from thingmap.detectors.shape_context.config import LENGTH, VotingConfig
 from thingmap.detectors.shape_context.detector import ShapeContextDetector
@@ -49,9 +49,9 @@ def test_onnx_with_options(model: Path):
 
 def test_shape_context_with_options(tmp_path: Path, make_frame):
     book = Codebook(np.eye(2, LENGTH), np.zeros((2, 2)), np.ones((2, 2)), 0.1, 50.0, 5.0, 2e-3)
-    certain = Calibration(np.ones(1), np.zeros(1), np.zeros(1))
+    certain = Calibration(np.ones((1, len(FEATURES))), np.zeros(1))
     file = tmp_path / "mugs.npz"
-    ShapeContextModel(("mug",), (book,), certain, VotingConfig(), {}).save(file)
+    ShapeContextModel(("mug",), (book,), {}, certain, VotingConfig(), {}).save(file)
     detector = make_detector(f"shape-context:{file}?confidence=0.3&max=7")
     assert isinstance(detector, ShapeContextDetector) and detector.classes == ("mug",)
     assert (detector.confidence, detector.max_detections) == (0.3, 7)

@@ -168,3 +168,22 @@ def test_wrong_arguments_are_told(points, radius, owner, said):
     edges, _ = edge_map([50], [50])
     with pytest.raises(ValueError, match=said):
         shape_contexts(edges, np.array(points), np.array(radius), owner)
+
+
+def test_what_is_turned_a_quarter_is_described_as_if_turned_back():
+    rng = np.random.default_rng(3)
+    offsets = rng.integers(-40, 41, (60, 2))
+    offsets = offsets[(offsets != 0).any(axis=1)]
+    orientation = rng.uniform(0.05, 0.7, len(offsets))  # within one bin
+    turned = np.stack([-offsets[:, 1], offsets[:, 0]], axis=1)
+    upright = around(offsets, 50.0, orientation)
+    every = np.concatenate([[[0, 0]], turned])
+    edges, places = edge_map(
+        MIDDLE + every[:, 0], MIDDLE + every[:, 1], np.concatenate([[0.0], orientation + np.pi / 2])
+    )
+    radius, turn = np.array([50.0], dtype=np.float32), np.array([np.pi / 2])
+    back = shape_contexts(edges, places[:1], radius, turn=turn).reshape(upright.shape)
+    # directions on a limit between two bins may fall to either side
+    assert np.abs(back - upright).sum() < 0.1
+    plain = shape_contexts(edges, places[:1], radius).reshape(upright.shape)
+    assert np.abs(plain - upright).sum() > 0.8

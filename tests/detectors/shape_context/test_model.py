@@ -11,7 +11,7 @@ import pytest
 from thingmap.datasets.errors import InputError
 from thingmap.detectors.hog.model import shipped_model
 from thingmap.detectors.model_file import schema_of
-from thingmap.detectors.shape_context.calibration import Calibration
+from thingmap.detectors.shape_context.calibration import FEATURES, Calibration
 from thingmap.detectors.shape_context.codebook import Codebook
 from thingmap.detectors.shape_context.config import LENGTH, Context, VotingConfig
 from thingmap.detectors.shape_context.model import REMEDY, ShapeContextModel, load_model
@@ -25,8 +25,10 @@ def make_model(classes: tuple[str, ...] = ("can", "mug")) -> ShapeContextModel:
         bins /= bins.sum(axis=1, keepdims=True)
         books.append(Codebook(bins, rng.normal(size=(7 + k, 2)), rng.random((7 + k, 2)) + 0.1, 0.05, 90.0, 9.0, 2e-3))
     count = len(classes)
-    calibration = Calibration(np.ones(count), np.zeros(count), -np.ones(count))
-    return ShapeContextModel(classes, tuple(books), calibration, VotingConfig(context=Context.IMAGE), {"seed": 3})
+    rivals = {0.05: books[0].descriptors[::-1]}
+    calibration = Calibration(np.ones((count, len(FEATURES))), np.zeros(count))
+    voting = VotingConfig(context=Context.IMAGE)
+    return ShapeContextModel(classes, tuple(books), rivals, calibration, voting, {"seed": 3})
 
 
 def test_what_was_saved_is_loaded(tmp_path: Path):
@@ -42,7 +44,8 @@ def test_what_was_saved_is_loaded(tmp_path: Path):
         assert (one.radius, one.edge_mean, one.edge_std, one.depth) == (
             other.radius, other.edge_mean, other.edge_std, other.depth,
         )  # fmt: skip
-    np.testing.assert_array_equal(again.calibration.absent, model.calibration.absent)
+    assert list(again.rivals) == [0.05] and np.abs(again.rivals[0.05] - model.rivals[0.05]).max() < 1e-3
+    np.testing.assert_array_equal(again.calibration.weights, model.calibration.weights)
 
 
 def test_saving_what_was_loaded_gives_the_same_file(tmp_path: Path):
@@ -62,6 +65,7 @@ def test_a_model_of_another_detector_is_refused():
     [
         lambda document, arrays: arrays.pop("descriptors_1"),
         lambda document, arrays: document.pop("calibration"),
+        lambda document, arrays: arrays.update(rivals_0=arrays["rivals_0"][:, :9]),
         lambda document, arrays: document["codebooks"][0].pop("radius"),
         lambda document, arrays: document["voting"].update(context="nowhere"),
         lambda document, arrays: document["voting"].update(unheard_of=1),
@@ -86,6 +90,8 @@ def test_parts_must_fit():
     model = make_model()
     with pytest.raises(ValueError, match="must be as many"):
         replace(model, classes=("can",))
+    with pytest.raises(ValueError, match="rivals must be of the codebooks' radii"):
+        replace(model, rivals={0.07: model.rivals[0.05]})
     book = model.codebooks[0]
     for name, value in (("offsets", book.offsets[:3]), ("descriptors", -book.descriptors), ("radius", 0.0)):
         with pytest.raises(ValueError):

@@ -10,6 +10,7 @@ import pytest
 
 from thingmap.detectors.shape_context.codebook import Codebook
 from thingmap.detectors.shape_context.config import Context, VotingConfig
+from thingmap.detectors.shape_context.described import describe
 from thingmap.detectors.shape_context.descriptor import shape_contexts
 from thingmap.detectors.shape_context.edges import find_edges
 from thingmap.detectors.shape_context.sampling import edge_owners
@@ -51,8 +52,9 @@ class Picture:
         edges = find_edges(self.color, self.depth)
         return edges, edge_owners(edges, self.labels, self.depth)
 
-    def scores(self, books, config: VotingConfig) -> ImageScores:
-        return score_proposals(*self.edges(), self.labels, self.xyxy, FOCAL, books, config)
+    def scores(self, books, config: VotingConfig, rivals=None) -> ImageScores:
+        described = describe(*self.edges(), FOCAL, config)
+        return score_proposals(described, self.labels, self.xyxy, books, config, rivals)
 
 
 @pytest.fixture(scope="module")
@@ -124,9 +126,29 @@ def test_contexts_of_the_whole_image_count_the_neighbours_edges(books):
     assert loss[Context.PROPOSAL] < 0.5 * loss[Context.IMAGE]
 
 
+def test_strength_is_the_normalised_score_from_zero_on(books):
+    scores = Picture(("disc", 20, 20, 1.0), ("cross", 200, 120, 1.0)).scores(books, CONFIG)
+    for k, book in enumerate(books):
+        s = scores.strength[:, k] * book.edge_mean
+        known = np.isfinite(scores.normalised[:, k])
+        np.testing.assert_allclose(scores.normalised[known, k], ((s - book.edge_mean) / book.edge_std)[known])
+        assert (scores.strength[~known, k] == 0.0).all() and (scores.agreement[~known, k] == 0.0).all()
+    assert (scores.agreement >= 0.0).all() and (scores.agreement <= 1.0).all()
+
+
+def test_rivals_that_look_the_same_take_the_contour_s_evidence_away(books):
+    picture = Picture(("disc", 20, 20, 1.0), ("cross", 200, 120, 1.0))
+    crosses = {RADIUS: books[1].descriptors}
+    against_crosses = picture.scores(books, CONFIG, crosses).contour
+    assert against_crosses[0, 0] > 0.1  # a disc is no cross
+    assert against_crosses[1, 0] < -0.1  # and a cross no disc
+    np.testing.assert_allclose(against_crosses[:, 1], 0.0, atol=1e-6)  # crosses are as near to themselves
+    assert (picture.scores(books, CONFIG).contour == 0.0).all()
+
+
 def test_nothing_to_see(books):
     scores = Picture().scores(books, CONFIG)
-    assert scores.normalised.shape == (0, 2) and scores.boxes.shape == (0, 2, 4)
+    assert scores.normalised.shape == scores.contour.shape == (0, 2) and scores.boxes.shape == (0, 2, 4)
 
 
 def test_the_same_picture_gives_the_same_scores(books):

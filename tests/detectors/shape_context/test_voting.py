@@ -8,10 +8,10 @@ from thingmap.detectors.shape_context.voting import Voters, cast_votes, valid_vo
 FOCAL = 100.0
 
 
-def voters(xy, depth=1.0, owner=0, weight=1.0) -> Voters:
+def voters(xy, depth=1.0, owner=0, weight=1.0, turn=0.0) -> Voters:
     xy = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
     each = np.ones(len(xy))
-    return Voters(xy, depth * each, np.asarray(owner * each, dtype=np.int32), weight * each)
+    return Voters(xy, depth * each, np.asarray(owner * each, dtype=np.int32), weight * each, turn * each)
 
 
 def test_votes_go_to_the_middle_at_every_depth(codebook):
@@ -33,6 +33,14 @@ def test_perfect_matches_of_a_whole_contour_add_up_to_its_length_at_the_training
         described = voters(np.zeros((10, 2)), depth, weight=points / 10)
         votes = cast_votes(described, np.zeros((10, 1), int), np.zeros((10, 1)), book, FOCAL, 0.1)
         assert votes.weight.sum() == pytest.approx(40.0)
+
+
+def test_votes_turn_with_what_they_are_on(codebook):
+    """A thing that leans a quarter turn clockwise has its right below."""
+    book = codebook([(0.1, 0.0), (0.0, -0.2)])
+    leaning = voters((30, 20), turn=np.pi / 2)
+    votes = cast_votes(leaning, np.array([[0, 1]]), np.zeros((1, 2)), book, FOCAL, 0.1)
+    np.testing.assert_allclose(votes.xy, [(30, 30), (50, 20)], atol=1e-5)
 
 
 def test_a_worse_match_counts_less(codebook):

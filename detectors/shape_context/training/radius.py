@@ -1,0 +1,29 @@
+"""The radius of descriptors, chosen on a validation set (section III-A, note 1)."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import rankdata
+
+
+def separations(own: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """How well scores by each of R radii tell a class from what is not of it.
+
+    The area under the ROC curve: the probability that one of the class scores higher than another, ties counting half.
+
+    Args:
+        own: (N, R) scores of what shows the class, NaN for none at all, N > 0.
+        others: (M, R) scores of what does not, likewise.
+
+    Returns:
+        (R,), 1 where all of the class score higher than any other.
+    """
+    scores = np.nan_to_num(np.concatenate([own, others]), nan=-np.inf)
+    ranks = rankdata(scores, axis=0)  # from 1; ties have their mean
+    above = ranks[: len(own)].sum(axis=0) - len(own) * (len(own) + 1) / 2.0
+    return above / (len(own) * len(others))
+
+
+def best_radius(areas: np.ndarray) -> int:
+    """Index of the radius of the greatest area; of several the first, which is the smallest and costs least."""
+    return int(areas.argmax())
