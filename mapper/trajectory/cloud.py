@@ -91,7 +91,7 @@ def _insert(table, keys):
     new = np.zeros(len(keys), dtype=np.bool_)
     for i in range(len(keys)):
         key = keys[i]
-        slot = ((key * np.int64(-7046029254386353131)) >> np.int64(20)) & mask
+        slot = ((key * np.int64(-7046029254386353131)) >> np.int64(40)) & mask
         while table[slot] != EMPTY and table[slot] != key:
             slot = (slot + 1) & mask
         if table[slot] == EMPTY:

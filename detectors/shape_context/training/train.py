@@ -77,7 +77,7 @@ def train(
         views.skipped.update(judged[label].skipped)
     radii = sorted(config.radii)
     areas = np.mean([judged[label].areas for label in material.classes], axis=0)
-    radius = radii[best_radius(areas)]
+    radius = best_radius(radii, areas)
     codebooks = tuple(_codebook(label, radius, material, config, on_progress) for label in material.classes)
     rivals = learn_rivals(scenes, len(material.classes), codebooks, config)
     total = sum(map(len, material.held_out.values())) + len(material.frames)

@@ -26,5 +26,8 @@ def test_it_is_the_share_of_pairs_in_the_right_order(own, others):
     assert separations(column(own), column(others))[0] == pytest.approx(np.mean(pairs))
 
 
-def test_of_equally_good_radii_the_smallest():
-    assert best_radius(np.array([0.7, 0.9, 0.9])) == 1
+def test_the_best_radius_and_of_equally_good_ones_the_usual():
+    radii = (0.03, 0.09, 0.2)
+    assert best_radius(radii, np.array([0.7, 0.8, 0.9])) == 0.2
+    assert best_radius(radii, np.array([1.0, 1.0, 1.0])) == 0.09
+    assert best_radius(radii, np.array([0.9, 0.7, 0.9])) == 0.2  # a factor of 2, not of 3
