@@ -17,6 +17,7 @@ from .detect import detect
 from .evaluate import evaluate
 from .export import export
 from .info import info
+from .label import label
 from .learn import learn
 from .query import query
 from .run import run
@@ -76,7 +77,7 @@ app = typer.Typer(
     add_completion=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, detect, query, export, info, evaluate, compare, synth, learn):
+for command in (run, detect, label, query, export, info, evaluate, compare, synth, learn):
     app.command()(command)
 app.add_typer(train, name="train")
 

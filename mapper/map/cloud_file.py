@@ -22,9 +22,15 @@ def write_cloud(file: Path, points: np.ndarray, colors: np.ndarray) -> None:
 
 
 def write_labels(
-    file: Path, points: np.ndarray, colors: np.ndarray, labels: np.ndarray, classes: Sequence[str]
+    file: Path,
+    points: np.ndarray,
+    colors: np.ndarray,
+    labels: np.ndarray,
+    classes: Sequence[str],
+    instance: np.ndarray | None = None,
+    things: Sequence[str] = (),
 ) -> None:
-    """A cloud with a class for every point.
+    """A cloud with a class for every point, and the thing that it belongs to where that is known.
 
     Args:
         file: to write.
@@ -33,11 +39,18 @@ def write_labels(
         labels: (M,) indices into `classes`, `NO_OBJECT` for none. In the file they are 0 for none and k + 1 for
             class k, which a comment line names: `comment label 3 "cup"`.
         classes: of the map.
+        instance: (M,) number of each point's thing, t + 1 for `things[t]` (`comment instance 1 "thing-0007"`) and 0 for
+            none; None where nobody knows: the file has no such property then.
+        things: their ids.
     """
-    vertices = _vertices(points, colors, ("label", "<i4"))
+    more = [("label", "<i4")] if instance is None else [("label", "<i4"), ("instance", "<i4")]
+    vertices = _vertices(points, colors, *more)
     vertices["label"] = np.where(labels == NO_OBJECT, 0, labels + 1)
-    names = [f"label {number} {json.dumps(name)}" for number, name in enumerate(classes, start=1)]
-    _write_vertices(file, vertices, names)
+    comments = _numbered("label", classes)
+    if instance is not None:
+        vertices["instance"] = instance
+        comments += _numbered("instance", things)
+    _write_vertices(file, vertices, comments)
 
 
 def read_cloud(file: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -54,6 +67,11 @@ def read_cloud(file: Path) -> tuple[np.ndarray, np.ndarray]:
         return points, np.stack([vertices[name] for name, _ in COLOR_FIELDS], axis=1)
     except (OSError, KeyError, ValueError, PlyParseError) as error:
         raise InputError(file, "a coloured cloud in PLY", str(error), AGAIN) from None
+
+
+def _numbered(what: str, names: Sequence[str]) -> list[str]:
+    """Comment lines that say what the numbers from 1 on mean."""
+    return [f"{what} {number} {json.dumps(name)}" for number, name in enumerate(names, start=1)]
 
 
 def _vertices(points: np.ndarray, colors: np.ndarray, *more: tuple[str, str]) -> np.ndarray:

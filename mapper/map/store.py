@@ -92,6 +92,11 @@ class OutputFolder:
         return self.path / "labels.ply"
 
     @property
+    def voxels_file(self) -> Path:
+        """What `thingmap label` has gathered, to go on from."""
+        return self.path / "voxels.npz"
+
+    @property
     def ledger_file(self) -> Path:
         """The mapper's measurements, from which its graph can be rebuilt."""
         return self.path / "ledger.npz"
@@ -124,9 +129,17 @@ class OutputFolder:
         """(M, 3) metres and (M, 3) uint8 RGB as binary PLY."""
         write_cloud(self.cloud_file, points, colors)
 
-    def write_labels(self, points: np.ndarray, colors: np.ndarray, labels: np.ndarray, classes: Sequence[str]) -> None:
+    def write_labels(
+        self,
+        points: np.ndarray,
+        colors: np.ndarray,
+        labels: np.ndarray,
+        classes: Sequence[str],
+        instance: np.ndarray | None = None,
+        things: Sequence[str] = (),
+    ) -> None:
         """The cloud with its labels; see `cloud_file.write_labels`. The evaluator reads it in place of the cloud."""
-        write_labels(self.labels_file, points, colors, labels, classes)
+        write_labels(self.labels_file, points, colors, labels, classes, instance, things)
 
     def set_labels_aside(self) -> None:
         """Labels of an earlier run, which are not this map's, get another name."""

@@ -1,0 +1,149 @@
+"""`thingmap label`: what each point of a map is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .interrupt import stop_on_interrupt
+from .sources import DatasetOption, choose_detector, skipped_line
+from .stages import StageProgress
+
+if TYPE_CHECKING:
+    from ...datasets.sequence import Sequence
+    from ..labelling.label_run import LabelReport
+    from ..labelling.labelling_config import LabellingConfig
+    from ..labelling.mrf_config import Smoothness
+    from ..map.store import OutputFolder
+
+BOUND_SWEEPS = 20  # of the lower bound, with --bound
+
+
+def label(
+    folder: Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `thingmap run` wrote.")],
+    smoothness: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TERM",
+            help="What it costs that neighbours differ: normals (little where surfaces meet inwards), colour, potts "
+            "(always the same) or none; normals by default.",
+        ),
+    ] = None,
+    fast: Annotated[bool, typer.Option("--fast", help="Mean field in place of graph cuts.")] = False,
+    stride: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Look at every Nth mapped frame; 10 by default.")
+    ] = None,
+    sequence: Annotated[
+        str | None, typer.Option(metavar="SEQUENCE", help="What was mapped, where it is elsewhere now.")
+    ] = None,
+    dataset: DatasetOption = None,
+    detector: Annotated[
+        str | None, typer.Option(metavar="SPEC", help="simulated, hog, onnx:MODEL, ...; the run's own by default.")
+    ] = None,
+    volumes: Annotated[
+        bool, typer.Option("--volumes/--no-volumes", help="Whether the boxes of the map's things are evidence too.")
+    ] = True,
+    bound: Annotated[bool, typer.Option("--bound", help="Say how far the labels are from the best at most.")] = False,
+    config: Annotated[Path | None, typer.Option(metavar="FILE", help="YAML over the defaults.")] = None,
+    again: Annotated[bool, typer.Option("--again", help="Look at all frames again.")] = False,
+) -> None:
+    """Label every point of a map.
+
+    OUT gets labels.ply, a point for each voxel with its class, and counts of points in map.json. What was gathered
+    stays in voxels.npz: the next time only frames that are new are looked at, and with other options for the labels
+    none.
+
+    Ctrl-C ends after the frame at hand; the next time goes on from there.
+    """
+    from ...detectors.spec import make_detector
+    from ..labelling.label_run import LabelJob
+    from ..map.store import OutputFolder
+
+    source = OutputFolder.open(folder)
+    settings = _settings(config, smoothness, fast, stride, volumes, bound)
+    asked = _asked(source)
+    name = sequence or asked.get("sequence")
+    frames = _open(source, name, dataset or (None if sequence else asked.get("dataset")), asked)
+    spec = choose_detector(detector or asked.get("detector"), str(name), frames)
+    job = LabelJob(source, frames, make_detector(spec, frames), f"{frames.name}, {spec}", settings, again)
+    with stop_on_interrupt() as should_stop, StageProgress() as progress:
+        report = job.execute(lambda done, total: progress.show("looking at frames", done, total), should_stop)
+    _tell(source, report)
+    if report.stopped:
+        raise typer.Exit(130)
+
+
+def _settings(
+    config: Path | None, smoothness: str | None, fast: bool, stride: int | None, volumes: bool, bound: bool
+) -> LabellingConfig:
+    """The configuration file over the defaults, with the command line over it."""
+    from ..config_file import load_config
+    from ..labelling.labelling_config import LabellingConfig
+
+    settings = load_config(config, LabellingConfig)
+    mrf = replace(settings.mrf, fast=fast or settings.mrf.fast)
+    if smoothness is not None:
+        mrf = replace(mrf, smoothness=_term(smoothness))
+    if bound:
+        mrf = replace(mrf, bound_sweeps=max(BOUND_SWEEPS, mrf.bound_sweeps))
+    sources = settings.sources if volumes else replace(settings.sources, volumes=0.0)
+    return replace(settings, mrf=mrf, sources=sources, stride=stride or settings.stride)
+
+
+def _term(name: str) -> Smoothness:
+    from ...datasets.errors import UserError
+    from ..labelling.mrf_config import Smoothness
+
+    try:
+        return Smoothness(name)
+    except ValueError:
+        raise UserError(f"--smoothness {name}: there are {', '.join(Smoothness)}; choose one of them") from None
+
+
+def _asked(folder: OutputFolder) -> Mapping[str, Any]:
+    """What `thingmap run` was asked for, as far as the report says."""
+    report = folder.read_report()
+    command = report.get("command") if isinstance(report, dict) else None
+    return command if isinstance(command, dict) else {}
+
+
+def _open(folder: OutputFolder, name: str | None, dataset: str | None, asked: Mapping[str, Any]) -> Sequence:
+    """The sequence as it was mapped.
+
+    Raises:
+        UserError: nobody says which it is, or it is not there any more.
+    """
+    from ...datasets.errors import UserError
+    from ...datasets.open import open_sequence
+
+    if name is None:
+        raise UserError(f"{folder.report_file}: it does not say what was mapped; give that with --sequence")
+    try:
+        return open_sequence(name, dataset, asked.get("stride") or 1, asked.get("max_frames"))
+    except UserError as error:
+        raise UserError(f"{folder.path}: what it was made of: {error}; or say where it is with --sequence") from None
+
+
+def _tell(folder: OutputFolder, report: LabelReport) -> None:
+    """What was done, in a few lines."""
+    skipped = skipped_line(report.skipped)
+    if skipped:
+        typer.echo(skipped, err=True)
+    if report.anew:
+        typer.echo("voxels that were there did not fit (other frames, poses or numbers): all frames looked at again")
+    if report.labels is None or report.points is None:
+        typer.echo(f"interrupted; {report.frames} frames are in {folder.voxels_file}, the next time goes on", err=True)
+        return
+    known = report.frames - report.added
+    typer.echo(f"{report.added} frames looked at" + (f", {known} known from before" if known else ""))
+    typer.echo(", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in report.seconds.items()))
+    labels = report.labels
+    gap = "" if labels.gap is None else f", at most {100.0 * labels.gap:.2g} % above the least there can be"
+    stopped = "" if labels.settled else ", not settled"
+    typer.echo(f"energy {labels.energy:.6g} over {report.voxels} voxels and {labels.pairs} pairs{gap}{stopped}")
+    counts = ", ".join(f"{name} {count}" for name, count in report.points.items())
+    typer.echo(f"points: {counts}; they are in {folder.labels_file}")

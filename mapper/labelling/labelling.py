@@ -1,0 +1,60 @@
+"""Labels of voxels: the random field of Lai et al. over what was gathered of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...datasets.truth import NO_OBJECT
+from .energy import PottsEnergy
+from .minimise import minimise
+from .mrf_config import MrfConfig, Smoothness
+from .neighbours import neighbour_pairs
+from .pairwise import pair_weights
+from .voxels import Voxels
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Labels:
+    """What every voxel is.
+
+    Attributes:
+        label: (N,) int64 index into the classes, `NO_OBJECT` for background.
+        pairs: of voxels that touch and are asked to agree.
+        energy: of the labels, nats (eq. 1).
+        gap: by which share of its lower bound the energy may be too high at most; None where no bound was asked for.
+        settled: whether the search ended by itself.
+    """
+
+    label: np.ndarray
+    pairs: int
+    energy: float
+    gap: float | None
+    settled: bool
+
+
+def label_voxels(voxels: Voxels, config: MrfConfig, more: np.ndarray | None = None) -> Labels:
+    """The labels of least energy that are found.
+
+    The data term of a voxel is the negative mean log probability of its points (eq. 7); of several sources their sum.
+
+    Args:
+        voxels: N of them, with the evidence of K classes.
+        config: the pairwise term and how to minimise.
+        more: (N, K + 1) log probabilities of another source, weighted as it shall count.
+    """
+    background = voxels.log_p.shape[1] - 1
+    log_p = voxels.log_p if more is None else voxels.log_p + more
+    has_pairs = config.smoothness is not Smoothness.NONE
+    edges = neighbour_pairs(voxels.cells) if has_pairs else np.empty((0, 2), np.int32)
+    weights = pair_weights(edges, voxels.cells, voxels.normals, voxels.colours, config)
+    found = minimise(PottsEnergy(-log_p.astype(np.float32), edges, weights), config)
+    label = found.labelling.labels.astype(np.int64)
+    return Labels(
+        label=np.where(label == background, NO_OBJECT, label),
+        pairs=len(edges),
+        energy=found.labelling.energy,
+        gap=found.gap,
+        settled=found.labelling.settled,
+    )

@@ -1,0 +1,61 @@
+"""What one frame says of its pixels: for each the log probability of every class, and of none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...datasets.frame import Frame
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PixelEvidence:
+    """P pixels of a frame and what they are.
+
+    Rows do not sum to one: each class is told from everything else by itself (Lai et al., eq. 3 to 5).
+
+    Attributes:
+        classes: K names.
+        uv: (P, 2) int32 pixels (column, row).
+        log_p: (P, K + 1) float32, ln p(c | x) of each class, the background's last; finite.
+
+    Raises:
+        ValueError: for other shapes, or a probability of nothing.
+    """
+
+    classes: tuple[str, ...]
+    uv: np.ndarray
+    log_p: np.ndarray
+
+    def __post_init__(self) -> None:
+        if self.uv.ndim != 2 or self.uv.shape[1] != 2:
+            raise ValueError(f"uv must have shape (P, 2), but got shape {self.uv.shape}")
+        expected = (len(self.uv), len(self.classes) + 1)
+        if self.log_p.shape != expected:
+            raise ValueError(f"log_p must have shape {expected}, but got shape {self.log_p.shape}")
+        if not np.isfinite(self.log_p).all():
+            raise ValueError("log_p must be finite: no pixel is of a class with probability 0")
+
+    def over(self, classes: Sequence[str], absent: float) -> PixelEvidence:
+        """The same in the order of other classes, among which all of these are; others have the probability `absent`.
+
+        Upper and lower case are the same.
+        """
+        if tuple(classes) == self.classes:
+            return self
+        column = {name.casefold(): k for k, name in enumerate(self.classes)}
+        log_p = np.full((len(self.uv), len(classes) + 1), np.log(absent), dtype=np.float32)
+        for k, name in enumerate(classes):
+            if name.casefold() in column:
+                log_p[:, k] = self.log_p[:, column[name.casefold()]]
+        log_p[:, -1] = self.log_p[:, -1]
+        return PixelEvidence(tuple(classes), self.uv, log_p)
+
+
+def pixel_grid(frame: Frame, step: int, near: float, far: float) -> np.ndarray:
+    """(P, 2) int32: every `step`-th column of every `step`-th row whose depth is in [near, far], metres, row by row."""
+    depth = frame.depth[::step, ::step]
+    rows, columns = np.nonzero((depth >= max(near, np.finfo(np.float32).tiny)) & (depth <= far))
+    return (np.stack([columns, rows], axis=1) * step).astype(np.int32)
