@@ -5,6 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# the first example may compile kernels
+settings.register_profile("thingmap", deadline=None)
+settings.load_profile("thingmap")
 
 REAL_DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data"
 
