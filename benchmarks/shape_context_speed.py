@@ -30,6 +30,7 @@ from thingmap.detectors.proposals.objectness import proposal_features, shipped_o
 from thingmap.detectors.proposals.proposals import Proposals, find_proposals
 from thingmap.detectors.shape_context.calibration import Calibration
 from thingmap.detectors.shape_context.config import Context
+from thingmap.detectors.shape_context.described import Described
 from thingmap.detectors.shape_context.described import describe as describe_points
 from thingmap.detectors.shape_context.detector import ShapeContextDetector
 from thingmap.detectors.shape_context.edges import find_edges
@@ -116,20 +117,19 @@ def time_stages(detector: ShapeContextDetector, frame: Frame, times: Times, repe
     described, rivals = describe_points(edges, owner, focal, config, turn), detector.model.rivals
 
     def contexts() -> None:
-        described._contexts.clear()  # they are kept once they are made
+        fresh = Described(edges, owner, focal, described.samples, described.voters, config)  # they are kept once made
         for book in books:
-            described.contexts(book.radius, book.depth)
+            fresh.contexts(book.radius, book.depth)
 
     def matching() -> None:
         for book in books:
             described.matches(book.descriptors, book, config.matches)
 
     def rival_matching() -> None:
-        for book in books:
-            if rivals:
-                described.matches(rivals[book.radius], book, config.matches)
+        for book in {book.radius: book for book in books if rivals}.values():
+            described.matches(rivals[book.radius], book, config.matches)
 
-    contexts()
+    matching()  # has the contexts made
     stages: dict[str, Callable[[], object]] = {
         PROPOSALS: proposals,
         "edges": lambda: find_edges(frame.color, frame.depth, within=within),

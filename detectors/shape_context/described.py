@@ -34,7 +34,7 @@ class Described:
     samples: Samples
     voters: Voters
     config: VotingConfig
-    _contexts: dict[float, np.ndarray] = field(default_factory=dict, repr=False)
+    _contexts: dict[tuple[float, float], np.ndarray] = field(default_factory=dict, repr=False)
 
     def contexts(self, radius: float, scale: float) -> np.ndarray:
         """(S, LENGTH) shape contexts of r = r_t z_t / z; asked again for a radius, the same array.
@@ -43,14 +43,15 @@ class Described:
             radius: metres at the object.
             scale: z_t / f of the training images, by which r_t is r in pixels where the radius does not follow depth.
         """
-        if radius not in self._contexts:
-            follows = self.config.scale_radius
+        follows = self.config.scale_radius
+        key = (radius, 0.0 if follows else scale)
+        if key not in self._contexts:
             metres_a_pixel = self.voters.depth / self.focal if follows else np.full(len(self.voters.depth), scale)
             own = self.owner if self.config.context is Context.PROPOSAL else None
             pixels = (radius / metres_a_pixel).astype(np.float32)
             turn = self.voters.turn
-            self._contexts[radius] = shape_contexts(self.edges, self.samples.points, pixels, own, turn)
-        return self._contexts[radius]
+            self._contexts[key] = shape_contexts(self.edges, self.samples.points, pixels, own, turn)
+        return self._contexts[key]
 
     def matches(self, descriptors: np.ndarray, codebook: Codebook, k: int) -> tuple[np.ndarray, np.ndarray]:
         """(S, k) int32 nearest of (M, LENGTH) descriptors of a codebook's radius, and (S, k) chi-square distances.

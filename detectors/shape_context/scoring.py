@@ -104,15 +104,16 @@ def score_proposals(
     voters, count = described.voters, len(xyxy)
     sides = np.sqrt((xyxy[:, 2:] - xyxy[:, :2]).prod(axis=1))
     hypotheses, valid = [], []
-    contour = np.zeros((count, len(codebooks)))
+    contour, away = np.zeros((count, len(codebooks))), {}
     for number, book in enumerate(codebooks):
         index, distance = described.matches(book.descriptors, book, config.matches)
         votes = cast_votes(voters, index, distance, book, described.focal, config.bandwidth)
         valid.append(votes.select(valid_votes(votes, labels, config.prune)))
         hypotheses.append(_hypotheses(valid[-1], sides, config))
         if rivals:
-            _, away = described.matches(rivals[book.radius], book, config.matches)
-            contour[:, number] = contour_evidence(distance, away, voters.owner, count, config.bandwidth)
+            if book.radius not in away:
+                _, away[book.radius] = described.matches(rivals[book.radius], book, config.matches)
+            contour[:, number] = contour_evidence(distance, away[book.radius], voters.owner, count, config.bandwidth)
     normalised, boxes = class_scores(hypotheses, codebooks, xyxy, config.min_iou)
     mean = np.array([book.edge_mean for book in codebooks])
     strength = np.nan_to_num(1.0 + normalised * np.array([book.edge_std for book in codebooks]) / mean)
