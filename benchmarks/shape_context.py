@@ -31,6 +31,7 @@ from shape_context_report import (
     box_row,
     level_table,
     point_row,
+    recall_table,
     result_table,
     thresholds,
     verdicts,
@@ -114,11 +115,13 @@ def describe(judged: Sequence[JudgedScene], limits: Thresholds) -> str:
             verdicts(boxes),
             f"Precision / recall (%) of boxes in {frames} frames of {len(judged)} scenes, and of labelled points:",
             result_table({**boxes, **points}),
+            "Recall (%) of boxes at equal precision, all classes together, thresholds by hindsight:",
+            recall_table(judged),
             "Boxes, means over the classes of objects, by clutter:",
             level_table(groups),
             f"Thresholds: {chosen}. Detector: {np.median([scene.milliseconds for scene in judged]):.0f} ms a frame, "
             "beside other jobs. The tracks are those of the paper with the share of 60 % taken of the views that could "
-            "show a track. Things of a graph are drawn into every frame, hidden there or not.",
+            "show a track; they are ranked by what their views say on average. Things of a graph are drawn into every frame, hidden there or not.",
         ]
     )
 

@@ -161,15 +161,16 @@ def _single_views(
 
 
 def _tracked(mapper: TrackMapper, classes: tuple[str, ...], case: Case) -> tuple[list[Matches], list[Called]]:
-    """Every proposal as what its track turned out to be in the end ("assigned to all views in the track")."""
-    number, labels = class_numbers(classes, case.truth), mapper.track_labels()
-    none = (BACKGROUND, 0.0)
+    """Every proposal as what its track turned out to be in the end ("assigned to all views in the track").
+
+    Ranked by what its views say on average: posteriors are 1 for most tracks, wrong ones among them.
+    """
+    number, labels, scores = class_numbers(classes, case.truth), mapper.track_labels(), mapper.track_scores()
     both = []
     for index, row in zip(case.truth_index.tolist(), case.run_index.tolist(), strict=True):
         xyxy, tracks = mapper.image_tracks(row)  # every frame is a keyframe
-        said = [labels.get(int(track), none) for track in tracks]
-        class_id = np.array([label for label, _ in said], dtype=np.int64)
-        score = np.array([probability for _, probability in said], dtype=np.float64)
+        class_id = np.array([labels[t][0] if t in labels else BACKGROUND for t in tracks.tolist()], dtype=np.int64)
+        score = np.array([scores.get(t, 0.0) for t in tracks.tolist()], dtype=np.float64)
         both.append(judge_called(xyxy, np.where(class_id >= 0, number[class_id], BACKGROUND), score, case.truth, index))
     return [match for match, _ in both], [called for _, called in both]
 

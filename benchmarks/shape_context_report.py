@@ -17,6 +17,8 @@ from thingmap.mapper.evaluation.points.label_scores import BACKGROUND, LabelScor
 AIM = 15.0  # points of recall that several views add to one (the paper: 62.8 -> 89.6)
 Thresholds = Mapping[Mode, float | None]
 
+PRECISIONS = (0.6, 0.7, 0.8, 0.85, 0.9)
+
 
 @dataclass(frozen=True, slots=True)
 class Share:
@@ -109,6 +111,18 @@ def level_table(groups: Mapping[str, Mapping[str, Row]]) -> str:
     names = list(next(iter(groups.values())))
     lines = [(name, *(_shown(rows[name].mean) for rows in groups.values())) for name in names]
     return table(("", *groups), lines)
+
+
+def recall_table(judged: Sequence[JudgedScene], precisions: Sequence[float] = PRECISIONS) -> str:
+    """The greatest recall (%) of each mode at precisions, all classes together, by hindsight; "-" where none is."""
+    lines = []
+    for mode in judged[0].matches:
+        ranked = scored(_matches(judged, mode))
+        right = np.cumsum(ranked.right[np.argsort(-ranked.scores, kind="stable")])
+        precision, recall = right / np.arange(1, len(right) + 1), right / max(ranked.objects, 1)
+        most = [recall[precision >= least].max(initial=0.0) for least in precisions]
+        lines.append((mode, *(f"{100.0 * value:.1f}" if value > 0.0 else "-" for value in most)))
+    return table(("", *(f"precision {100.0 * least:.0f} %" for least in precisions)), lines)
 
 
 def verdicts(rows: Mapping[str, Row]) -> str:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
+from scipy.special import softmax
 
 from ..config import MultiViewConfig
 from .kept_views import NOBODY, KeptView
@@ -32,6 +33,9 @@ class Assessment:
 
     Attributes:
         posterior: (T, K + 1) p(C | all views), the background last.
+        per_view: (T, K + 1) the same if all views of a track counted as one: their geometric mean. What one view takes
+            for something, the next often does too: after ten of them the posterior is 1 or 0 in most tracks, wrong ones
+            among them, and no longer tells which are surer.
         centroids: (T, 3) world, metres.
         seen: (T, V) bool, whether a detection of the view is of the track.
         sight: (T, V) `Sight` of its centroid.
@@ -39,6 +43,7 @@ class Assessment:
     """
 
     posterior: np.ndarray
+    per_view: np.ndarray
     centroids: np.ndarray
     seen: np.ndarray
     sight: np.ndarray
@@ -103,7 +108,9 @@ def assess(
         Fate.DROPPED if not enough else Fate.BACKGROUND if nothing else Fate.KEPT
         for enough, nothing in zip(often, background, strict=True)
     ]
-    return Assessment(posterior, centroids, seen, sights, tuple(fates))
+    views_of_each = np.maximum(seen.sum(axis=1), 1)[:, None]
+    per_view = softmax(log_posterior / views_of_each, axis=1) if len(posterior) else posterior
+    return Assessment(posterior, per_view, centroids, seen, sights, tuple(fates))
 
 
 def _shares(seen: np.ndarray, missed: np.ndarray) -> np.ndarray:

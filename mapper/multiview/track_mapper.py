@@ -156,6 +156,13 @@ class TrackMapper(SemanticMapper):
         labels = assessment.labels
         return {t: (int(k), float(assessment.posterior[t, k])) for t, k in enumerate(labels)}  # -1: the last column
 
+    def track_scores(self) -> dict[int, float]:
+        """Number of every track -> how sure its label is, by which tracks are ranked (`Assessment.per_view`)."""
+        assessment = self.assess()
+        if assessment is None:
+            return {}
+        return {t: float(assessment.per_view[t, k]) for t, k in enumerate(assessment.labels)}
+
     def statistics(self) -> dict[str, Any]:
         """As `SemanticMapper.statistics`, and `tracks`: views, observations, and tracks by what became of them."""
         assessment = self.assess()
