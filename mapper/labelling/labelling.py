@@ -12,6 +12,7 @@ from .minimise import minimise
 from .mrf_config import MrfConfig, Smoothness
 from .neighbours import neighbour_pairs
 from .pairwise import pair_weights
+from .voxel_normals import surface_normals
 from .voxels import Voxels
 
 
@@ -48,7 +49,10 @@ def label_voxels(voxels: Voxels, config: MrfConfig, more: np.ndarray | None = No
     log_p = voxels.log_p if more is None else voxels.log_p + more
     has_pairs = config.smoothness is not Smoothness.NONE
     edges = neighbour_pairs(voxels.cells) if has_pairs else np.empty((0, 2), np.int32)
-    weights = pair_weights(edges, voxels.cells, voxels.normals, voxels.colours, config)
+    normals = voxels.normals
+    if config.smoothness is Smoothness.NORMALS:
+        normals = surface_normals(voxels.cells, normals, config.normals_radius, config.normals_agreement)
+    weights = pair_weights(edges, voxels.cells, normals, voxels.colours, config)
     found = minimise(PottsEnergy(-log_p.astype(np.float32), edges, weights), config)
     label = found.labelling.labels.astype(np.int64)
     return Labels(

@@ -19,17 +19,17 @@ def pair_weights(
     Args:
         edges: (E, 2) int32 pairs of voxels.
         voxels, normals, colours: (N, 3) each, see below.
-        config: which term, and its numbers.
+        config: which term, and its numbers; its strengths are divided by `looks`, which here stand against one look.
 
     Returns:
         (E,) float32 nats.
     """
     if config.smoothness is Smoothness.NORMALS:
-        strength, share, offset = config.normals_strength, config.concave_share, config.normals_offset
+        strength, share, offset = config.normals_strength / config.looks, config.concave_share, config.normals_offset
         return normal_weights(edges, voxels, normals, strength, share, offset)
     if config.smoothness is Smoothness.COLOUR:
-        return colour_weights(edges, colours, config.plain_strength, config.contrast)
-    return potts_weights(edges, config.plain_strength if config.smoothness is Smoothness.POTTS else 0.0)
+        return colour_weights(edges, colours, config.colour_strength / config.looks, config.contrast)
+    return potts_weights(edges, config.potts_strength / config.looks if config.smoothness is Smoothness.POTTS else 0.0)
 
 
 def potts_weights(edges: np.ndarray, strength: float) -> np.ndarray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -60,6 +62,24 @@ def test_neighbours_outvote_one_that_differs(smoothness, fast):
     alone = label_voxels(voxels, MrfConfig(smoothness=Smoothness.NONE))
     together = label_voxels(voxels, MrfConfig(smoothness=smoothness, fast=fast))
     assert alone.label[4] == 1 and (together.label == 0).all() and together.pairs == 20
+
+
+def test_normals_cut_where_a_box_stands_on_the_table():
+    """What a detector's box has spilled over the table goes, as it borders on the box in a crease only."""
+    wall = np.stack(np.meshgrid([0], np.arange(30), np.arange(12), indexing="ij"), axis=-1).reshape(-1, 3)
+    table = np.stack(np.meshgrid(np.arange(1, 15), np.arange(30), [0], indexing="ij"), axis=-1).reshape(-1, 3)
+    cells, is_box = np.concatenate([wall, table]), np.arange(len(wall) + len(table)) < len(wall)
+    spilled = ~is_box & (cells[:, 0] <= 3)
+    p = np.where(is_box[:, None], [0.6, 0.01, 0.01, 0.05], [0.05, 0.01, 0.01, 0.3])
+    p[spilled] = [0.3, 0.01, 0.01, 0.2]
+    normals = np.where(is_box[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+    normals += np.random.default_rng(3).normal(scale=0.15, size=normals.shape)  # as rough as pixels' are
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    voxels = replace(make_voxels(cells, p), normals=normals.astype(np.float32))
+    right = np.where(is_box, 0, NO_OBJECT)
+    assert (label_voxels(voxels, MrfConfig()).label == right).all()
+    by_potts = label_voxels(voxels, MrfConfig(smoothness=Smoothness.POTTS)).label
+    assert (by_potts[spilled] == 0).all()
 
 
 def test_a_bound_is_told_when_asked_for():

@@ -110,11 +110,11 @@ def test_the_configuration_names_the_term() -> None:
     def weights(config: MrfConfig) -> list[float]:
         return pair_weights(PAIR, voxels, normals, colours, config).tolist()
 
-    normal = normal_weights(PAIR, voxels, normals, LAMBDA, EPSILON, MrfConfig().normals_offset).tolist()
-    assert weights(MrfConfig()) == normal
-    colour = MrfConfig(smoothness=Smoothness.COLOUR, plain_strength=5.0, contrast=0.7)
+    normal = normal_weights(PAIR, voxels, normals, LAMBDA / 4.0, EPSILON, MrfConfig().normals_offset).tolist()
+    assert weights(MrfConfig(looks=4.0)) == normal
+    colour = MrfConfig(smoothness=Smoothness.COLOUR, colour_strength=5.0, contrast=0.7, looks=1.0)
     assert weights(colour) == colour_weights(PAIR, colours, 5.0, 0.7).tolist()
-    assert weights(MrfConfig(smoothness=Smoothness.POTTS, plain_strength=3.0)) == [3.0]
+    assert weights(MrfConfig(smoothness=Smoothness.POTTS, potts_strength=3.0, looks=2.0)) == [1.5]
     assert weights(MrfConfig(smoothness=Smoothness.NONE)) == [0.0]
 
 
@@ -123,6 +123,9 @@ def test_the_configuration_names_the_term() -> None:
     [
         {"normals_strength": -1.0},
         {"normals_offset": 0.0},
+        {"looks": 0.0},
+        {"normals_agreement": 1.0},
+        {"normals_radius": -1.0},
         {"contrast": np.nan},
         {"max_sweeps": 0},
         {"bound_sweeps": -1},
