@@ -15,9 +15,11 @@ from .progress import FrameProgress
 from .sources import DatasetOption, MaxFramesOption, SequenceArgument, StrideOption, skipped_line
 
 if TYPE_CHECKING:
+    from ...datasets.frame import Frame
     from ...datasets.sequence import Sequence
     from ...detectors.detections import Detections
     from ...detectors.detector import Detector
+    from ..labelling.validation import Validator
 
 
 def detect(
@@ -27,11 +29,18 @@ def detect(
     dataset: DatasetOption = None,
     stride: StrideOption = 1,
     max_frames: MaxFramesOption = None,
+    validate: Annotated[
+        Path | None,
+        typer.Option(metavar="OUT", help="Leave out boxes that disagree with the points of a labelled run."),
+    ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace FILE if it is there.")] = False,
 ) -> None:
     """Run a detector over a sequence and keep what it finds.
 
     `thingmap run --detector recorded:FILE` maps from the file.
+
+    With --validate OUT, the folder of a run of this sequence that `thingmap label` has labelled, a box stays only where
+    its class is that of most points in the middle of it. Give the detector a low threshold then.
 
     Ctrl-C ends after the frame at hand and writes the frames so far.
     """
@@ -39,13 +48,18 @@ def detect(
     from ...datasets.open import open_sequence
     from ...detectors.recorded import write_detections
     from ...detectors.spec import make_detector
+    from ..labelling.validation import Validator
+    from ..map.store import OutputFolder
 
     if output.exists() and not overwrite:
         raise InputError(output, "a new file", "an existing one", "choose another name or add --overwrite")
     frames = open_sequence(sequence, dataset=dataset, stride=stride, max_frames=max_frames)
     call = make_detector(detector, frames)
+    validator = None if validate is None else Validator.load(OutputFolder.open(validate))
+    if validator is not None and all(validator.pose_at(stamp) is None for stamp in frames.stamps):
+        raise UserError(f"{validate}: none of its frames are in {sequence}, by their stamps; give the run of that")
     with stop_on_interrupt() as should_stop, FrameProgress("detecting", len(frames)) as progress:
-        job = _Detecting(frames, call, progress, should_stop)
+        job = _Detecting(frames, call, validator, progress, should_stop)
         items = iter(job)
         first = next(items, None)
         if first is None and not job.stopped:
@@ -58,6 +72,10 @@ def detect(
         typer.echo(skipped, err=True)
     if written:
         typer.echo(f"{job.boxes} boxes in {written} frames; they are in {output}")
+        if validate is not None:
+            typer.echo(f"{job.pruned} more disagreed with {validate} and were left out")
+        if job.unmapped:
+            typer.echo(f"{job.unmapped} frames are not in {validate}: their boxes are as they were found", err=True)
     if job.stopped:
         what = f"the {written} frames before are in {output}" if written else "nothing is written"
         typer.echo(f"interrupted; {what}", err=True)
@@ -65,15 +83,22 @@ def detect(
 
 
 class _Detecting:
-    """Frame names and their detections, in order; counts as it goes."""
+    """Frame names and their detections, validated where something does that, in order; counts as it goes."""
 
     def __init__(
-        self, sequence: Sequence, detector: Detector, progress: FrameProgress, should_stop: Callable[[], bool]
+        self,
+        sequence: Sequence,
+        detector: Detector,
+        validator: Validator | None,
+        progress: FrameProgress,
+        should_stop: Callable[[], bool],
     ) -> None:
-        self._sequence, self._detector = sequence, detector
+        self._sequence, self._detector, self._validator = sequence, detector, validator
         self._progress, self._should_stop = progress, should_stop
         self.skipped: dict[str, list[str]] = defaultdict(list)
         self.boxes = 0
+        self.pruned = 0
+        self.unmapped = 0
         self.stopped = False
 
     def __iter__(self) -> Iterator[tuple[str, Detections]]:
@@ -88,7 +113,18 @@ class _Detecting:
                 if isinstance(reading.result, BrokenFrame):
                     self.skipped[reading.result.problem.value].append(reading.result.name)
                     continue
-                detections = self._detector(reading.result)
+                detections = self._validated(reading.result, self._detector(reading.result))
                 self.boxes += len(detections)
                 self._progress.show(reading.position + 1, f"{self.boxes} boxes")
                 yield reading.result.name, detections
+
+    def _validated(self, frame: Frame, detections: Detections) -> Detections:
+        if self._validator is None:
+            return detections
+        T_world_camera = self._validator.pose_at(frame.stamp)
+        if T_world_camera is None:
+            self.unmapped += 1
+            return detections
+        stay = self._validator.validate(detections, frame, T_world_camera)
+        self.pruned += int((~stay).sum())
+        return detections.select(stay)

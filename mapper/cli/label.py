@@ -15,11 +15,13 @@ from .stages import StageProgress
 
 if TYPE_CHECKING:
     from ...datasets.sequence import Sequence
+    from ..labelling.instances import Instances, ThingPoints
     from ..labelling.label_run import LabelReport
     from ..labelling.labelling_config import LabellingConfig
     from ..labelling.mrf_config import Smoothness
     from ..map.store import OutputFolder
 
+NAMED = 5  # things and segments named on the screen
 BOUND_SWEEPS = 20  # of the lower bound, with --bound
 
 
@@ -53,9 +55,9 @@ def label(
 ) -> None:
     """Label every point of a map.
 
-    OUT gets labels.ply, a point for each voxel with its class, and counts of points in map.json. What was gathered
-    stays in voxels.npz: the next time only frames that are new are looked at, and with other options for the labels
-    none.
+    OUT gets labels.ply, a point for each voxel with its class and its thing, and counts of points in map.json. What was
+    gathered stays in voxels.npz: the next time only frames that are new are looked at, and with other options for the
+    labels none.
 
     Ctrl-C ends after the frame at hand; the next time goes on from there.
     """
@@ -147,3 +149,30 @@ def _tell(folder: OutputFolder, report: LabelReport) -> None:
     typer.echo(f"energy {labels.energy:.6g} over {report.voxels} voxels and {labels.pairs} pairs{gap}{stopped}")
     counts = ", ".join(f"{name} {count}" for name, count in report.points.items())
     typer.echo(f"points: {counts}; they are in {folder.labels_file}")
+    if report.instances is not None:
+        _tell_instances(report.instances)
+
+
+def _tell_instances(instances: Instances) -> None:
+    """Where the map's things and the points do not fit."""
+    things = instances.things
+    bare = [thing.id for thing in things if not thing.points]
+    typer.echo(
+        f"{len(things) - len(bare)} of {len(things)} things have points" + (f"; none: {_some(bare)}" if bare else "")
+    )
+    doubted = [_sizes(thing) for thing in things if thing.size is not None and thing.size.disagrees.any()]
+    if doubted:
+        typer.echo(f"{len(doubted)} are of another size than their points: {_some(doubted)}")
+    if instances.loose:
+        loose = [f"{segment.label} of {segment.points}" for segment in instances.loose]
+        typer.echo(f"{len(loose)} segments of points are no thing of the map's: {_some(loose)}")
+
+
+def _sizes(thing: ThingPoints) -> str:
+    assert thing.size is not None
+    box, points = (" x ".join(f"{100.0 * x:.0f}" for x in size) for size in (thing.size.volume, thing.size.extent))
+    return f"{thing.id} ({box} cm, points {points} cm)"
+
+
+def _some(names: list[str]) -> str:
+    return ", ".join(names[:NAMED]) + (", ..." if len(names) > NAMED else "")

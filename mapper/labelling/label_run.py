@@ -1,6 +1,7 @@
 """The labelling job: a run's output folder, its sequence and a detector become a cloud with labels.
 
-    mapped frames -> detector -> evidence of pixels -> voxels -> random field -> labels.ply, counts in map.json
+    mapped frames -> detector -> evidence of pixels -> voxels -> random field -> things' points
+                                                                          -> labels.ply, counts in map.json
 
 What is gathered stays in the folder (voxels.npz): the next time, only frames that are new, or that have moved against
 their keyframe, are looked at.
@@ -25,6 +26,7 @@ from ..map.object_map import ObjectMap
 from ..map.store import OutputFolder
 from ..stages import StageClock
 from .gathering import Gathered, Gatherer, check_classes
+from .instances import Instances, find_instances
 from .label_state import LabelState
 from .labelled_files import write_labelling
 from .labelling import Labels, label_voxels
@@ -33,7 +35,7 @@ from .mapped_frames import MappedFrames, mapped_frames
 from .volumes_evidence import volumes_evidence
 from .voxels import VoxelEvidence, Voxels
 
-FindInstances = Callable[[Voxels, Labels, ObjectMap], np.ndarray]
+FindInstances = Callable[[Voxels, Labels, ObjectMap, LabellingConfig], Instances]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,6 +52,7 @@ class LabelReport:
         voxels: N.
         points: class -> voxels of it, those that have any, and of the background.
         labels: of the voxels.
+        instances: whose they are; None too where that was left out.
     """
 
     frames: int
@@ -61,6 +64,7 @@ class LabelReport:
     voxels: int | None = None
     points: Mapping[str, int] | None = None
     labels: Labels | None = None
+    instances: Instances | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +78,7 @@ class LabelJob:
         spec: what sequence and detector are called: voxels that were gathered from others are not gone on from.
         config: numbers.
         again: gather anew whatever there is.
-        find_instances: (N,) number of each voxel's thing in the map, from 1 on, 0 for none; None to leave that out.
+        find_instances: what says which thing of the map each voxel is of; None to leave that out.
     """
 
     folder: OutputFolder
@@ -83,7 +87,7 @@ class LabelJob:
     spec: str
     config: LabellingConfig = field(default_factory=LabellingConfig)
     again: bool = False
-    find_instances: FindInstances | None = None
+    find_instances: FindInstances | None = find_instances
 
     def execute(
         self,
@@ -111,10 +115,13 @@ class LabelJob:
             volumes = self._volumes(voxels, run.object_map)
         with clock.stage("labelling"):
             labels = label_voxels(voxels, self.config.mrf, volumes)
+        find = self.find_instances
+        with clock.stage("instances"):
+            instances = find(voxels, labels, run.object_map, self.config) if find else None
         with clock.stage("writing"):
-            instance = self.find_instances(voxels, labels, run.object_map) if self.find_instances else None
-            points = write_labelling(self.folder, run.object_map, voxels, labels.label, instance)
-        return replace(report, seconds=_totals(clock), voxels=len(voxels.points), points=points, labels=labels)
+            points = write_labelling(self.folder, run.object_map, voxels, labels.label, instances)
+        found = {"points": points, "labels": labels, "instances": instances}
+        return replace(report, seconds=_totals(clock), voxels=len(voxels.points), **found)
 
     def _gather(
         self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import numpy as np
 
@@ -13,13 +14,15 @@ from ..map.atomic import write_atomic
 from ..map.map_file import format_document
 from ..map.object_map import ObjectMap
 from ..map.store import AGAIN, OutputFolder
+from .instances import Instances, ThingPoints
 from .voxels import Voxels
 
 BACKGROUND = "background"
+POINTS_KEYS = ("points", "points_size", "points_size_std")  # of a thing of the map, as `map_file` reads them
 
 
 def write_labelling(
-    folder: OutputFolder, object_map: ObjectMap, voxels: Voxels, label: np.ndarray, instance: np.ndarray | None
+    folder: OutputFolder, object_map: ObjectMap, voxels: Voxels, label: np.ndarray, instances: Instances | None
 ) -> dict[str, int]:
     """Write labels.ply and add counts to map.json; returns class -> number of points, the background's last.
 
@@ -28,15 +31,15 @@ def write_labelling(
         object_map: its map.
         voxels: N, a point each.
         label: (N,) indices into the map's classes, `NO_OBJECT` for background.
-        instance: (N,) number of each point's thing in the map, from 1 on, 0 for none; None where nobody knows.
+        instances: whose the points are; None where nobody knows.
     """
     colors = labelled_colors(voxels.colours, label, object_map.classes)
     ids = [thing.id for thing in object_map.things]
-    folder.write_labels(voxels.points, colors, label, object_map.classes, instance, ids)
+    number = None if instances is None else instances.number
+    folder.write_labels(voxels.points, colors, label, object_map.classes, number, ids)
     points = {name: int(np.sum(label == k)) for k, name in enumerate(object_map.classes)}
     points = {name: count for name, count in points.items() if count} | {BACKGROUND: int(np.sum(label == NO_OBJECT))}
-    owned = None if instance is None else np.bincount(instance, minlength=len(ids) + 1)[1:].tolist()
-    _add_counts(folder, points, owned)
+    _add_counts(folder, points, instances)
     return points
 
 
@@ -47,8 +50,9 @@ def labelled_colors(colors: np.ndarray, label: np.ndarray, classes: tuple[str, .
     return np.where((label == NO_OBJECT)[:, None], seen, table[label])
 
 
-def _add_counts(folder: OutputFolder, points: dict[str, int], owned: list[int] | None) -> None:
-    """Beside the map's other values `labels`, with the file and the points of each class; for each thing its points.
+def _add_counts(folder: OutputFolder, points: dict[str, int], instances: Instances | None) -> None:
+    """Beside the map's other values `labels`, with the file and the points of each class; for each thing its points,
+    and the size that they suggest where the map has another.
 
     Readers that do not know these pass over them.
     """
@@ -58,8 +62,16 @@ def _add_counts(folder: OutputFolder, points: dict[str, int], owned: list[int] |
         raise InputError(folder.map_file, "a map in JSON", str(error), AGAIN) from None
     things = document.pop("things")
     for number, thing in enumerate(things):
-        thing.pop("points", None)
-        if owned is not None:
-            thing["points"] = owned[number]
+        for name in POINTS_KEYS:
+            thing.pop(name, None)
+        if instances is not None:
+            thing |= _of_points(instances.things[number])
     document |= {"labels": {"file": folder.labels_file.name, "points": points}, "things": things}
     write_atomic(folder.map_file, format_document(document).encode())
+
+
+def _of_points(thing: ThingPoints) -> dict[str, Any]:
+    values: dict[str, Any] = {"points": thing.points}
+    if thing.size is not None and thing.size.estimate is not None and thing.size.std is not None:
+        values |= {"points_size": thing.size.estimate.tolist(), "points_size_std": thing.size.std.tolist()}
+    return values

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from ...datasets.errors import UserError
 from ...detectors.hog.maps import MapConfig
 from ...detectors.probability_maps import ALPHA
+from .instance_config import InstanceConfig
 from .mrf_config import MrfConfig
 from .voxel_config import VoxelConfig
 
@@ -56,6 +57,7 @@ class LabellingConfig:
         sources: of evidence.
         voxels: in which it is gathered.
         mrf: what makes labels of it.
+        instances: how labelled voxels become points of things.
         moved: metres, and
         turned: radians, by which a frame may have moved against its keyframe without being looked at again: half a
             voxel at 3 m.
@@ -68,6 +70,7 @@ class LabellingConfig:
     sources: SourceConfig = field(default_factory=SourceConfig)
     voxels: VoxelConfig = field(default_factory=VoxelConfig)
     mrf: MrfConfig = field(default_factory=MrfConfig)
+    instances: InstanceConfig = field(default_factory=InstanceConfig)
     moved: float = 0.003
     turned: float = 0.0015
 

@@ -13,6 +13,7 @@ from ...datasets.truth import NO_OBJECT
 from .atomic import replacing
 
 AGAIN = "write it again with `thingmap run`"
+LABEL_AGAIN = "write it again with `thingmap label`"
 COLOR_FIELDS = (("red", "u1"), ("green", "u1"), ("blue", "u1"))
 
 
@@ -67,6 +68,34 @@ def read_cloud(file: Path) -> tuple[np.ndarray, np.ndarray]:
         return points, np.stack([vertices[name] for name, _ in COLOR_FIELDS], axis=1)
     except (OSError, KeyError, ValueError, PlyParseError) as error:
         raise InputError(file, "a coloured cloud in PLY", str(error), AGAIN) from None
+
+
+def read_instances(file: Path) -> dict[str, np.ndarray]:
+    """Id of each thing that the labelled cloud names -> its points, (M, 3) float64 metres, read-only.
+
+    Raises:
+        InputError: the file is absent or damaged, or says of no point whose it is.
+    """
+    from plyfile import PlyData, PlyParseError
+
+    try:
+        content = PlyData.read(str(file))
+        vertices = content["vertex"].data
+        if "instance" not in (vertices.dtype.names or ()):
+            raise InputError(file, "an `instance` for every vertex", "no such property", LABEL_AGAIN)
+        points = np.stack([vertices[axis] for axis in "xyz"], axis=1).astype(np.float64)
+        number = vertices["instance"].astype(np.int64)
+        lines = [line.split(maxsplit=2) for line in content.comments]
+        named = [(int(words[1]), str(json.loads(words[2]))) for words in lines if words[0] == "instance"]
+    except (OSError, LookupError, ValueError, PlyParseError) as error:
+        raise InputError(file, "a labelled cloud in PLY", str(error), LABEL_AGAIN) from None
+    order = np.argsort(number, kind="stable")
+    ordered = number[order]
+    ends = ((thing, *(np.searchsorted(ordered, n, side) for side in ("left", "right"))) for n, thing in named)
+    own = {thing: points[order[first:last]] for thing, first, last in ends}
+    for array in own.values():
+        array.setflags(write=False)
+    return own
 
 
 def _numbered(what: str, names: Sequence[str]) -> list[str]:

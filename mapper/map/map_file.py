@@ -13,6 +13,7 @@ import numpy as np
 from ...datasets.errors import InputError
 from ...datasets.json_record import JsonRecord
 from .atomic import make_folder, write_atomic
+from .labelled_cloud import LabelledCloud
 from .object_map import MapFrame, ObjectMap, UpDirection
 from .thing import Evidence, Thing
 from .views_file import EvidenceFile, StoredViews, evidence_path, write_views
@@ -70,7 +71,8 @@ def to_document(object_map: ObjectMap, include_doubtful: bool = False) -> dict[s
     Class probabilities below 1e-4 are left out and the others are kept as they are, not scaled up: what is missing from
     a sum of 1 belongs to the classes that are absent, and dividing by the sum renormalises.
     """
-    up = object_map.up
+    up, labels = object_map.up, object_map.labels
+    labelled = {} if labels is None else {"labels": {"file": labels.file.name, "points": dict(labels.points)}}
     return {
         "schema": SCHEMA,
         "source": object_map.source,
@@ -81,6 +83,7 @@ def to_document(object_map: ObjectMap, include_doubtful: bool = False) -> dict[s
             "source": up.source,
         },
         "classes": list(object_map.classes),
+        **labelled,
         "things": [thing_to_dict(thing) for thing in _written(object_map, include_doubtful)],
     }
 
@@ -104,6 +107,7 @@ def from_document(document: Any, file: Path) -> ObjectMap:
             source=root.text("source"),
             frame=MapFrame(root.choice("frame", tuple(MapFrame))),
             up=_up_from(up),
+            labels=_labels_of(root, file),
         )
 
 
@@ -141,7 +145,16 @@ def thing_to_dict(thing: Thing) -> dict[str, Any]:
         "first_seen": thing.first_seen,
         "last_seen": thing.last_seen,
         "evidence": asdict(thing.evidence),
+        **_points_to_dict(thing),
     }
+
+
+def _points_to_dict(thing: Thing) -> dict[str, Any]:
+    """What labelling has added to a thing; nothing where it was not labelled."""
+    values = {"points": thing.points}
+    for name in ("points_size", "points_size_std"):
+        values[name] = None if getattr(thing, name) is None else getattr(thing, name).tolist()
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def _evidence_of(root: JsonRecord, file: Path) -> EvidenceFile:
@@ -151,6 +164,18 @@ def _evidence_of(root: JsonRecord, file: Path) -> EvidenceFile:
     named = root.record("evidence")
     with named.explaining():  # a name that is none, such as one with a slash
         return EvidenceFile(file.with_name(named.name("file")), named.name("sha256"), file)
+
+
+def _labels_of(root: JsonRecord, file: Path) -> LabelledCloud | None:
+    if "labels" not in root:
+        return None
+    named = root.record("labels")
+    points = named.record("points")
+    with named.explaining():  # a name that is none, such as one with a slash
+        return LabelledCloud(
+            file.with_name(named.name("file")),
+            {name: points.count(name) for name in named.numbers_by_name("points")},
+        )
 
 
 def _thing_from(record: JsonRecord, views: EvidenceFile) -> Thing:
@@ -171,6 +196,8 @@ def _thing_from(record: JsonRecord, views: EvidenceFile) -> Thing:
             last_seen=record.number("last_seen"),
             evidence=Evidence(*(evidence.count(name) for name in ("supporting", "occluded", "contradicting"))),
             views=StoredViews(views, record.text("id")),
+            points=record.count("points") if "points" in record else None,
+            **{name: record.array(name, (3,)) for name in ("points_size", "points_size_std") if name in record},
         )
 
 

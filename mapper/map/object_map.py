@@ -6,12 +6,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...datasets.errors import UserError
 from .region import as_region, probability_inside
 from .thing import Thing
 from .upright import upright_rotation
+
+if TYPE_CHECKING:
+    from .labelled_cloud import LabelledCloud
 
 PROBABLE = 0.5  # by default a question about places is answered with what is more likely true than not
 
@@ -75,6 +80,7 @@ class ObjectMap:
         source: what was mapped.
         frame: whose axes positions are in.
         up: needed to place the upright boxes.
+        labels: the cloud whose points are labelled, where `thingmap label` wrote one.
     """
 
     things: tuple[Thing, ...]
@@ -82,6 +88,7 @@ class ObjectMap:
     source: str
     frame: MapFrame
     up: UpDirection
+    labels: LabelledCloud | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "things", tuple(self.things))
@@ -105,6 +112,8 @@ class ObjectMap:
     def save(self, path: str | Path, include_doubtful: bool = False, *, evidence: bool = True) -> Path:
         """Write to a `.json` file, or as `map.json` into a folder; returns the file, which is replaced if it was there.
 
+        A labelled cloud is named as it was, beside the file; it is not copied.
+
         Args:
             path: where to.
             include_doubtful: write things whose existence is below 0.5 too.
@@ -123,6 +132,26 @@ class ObjectMap:
     def knows(self, label: str) -> bool:
         """Whether `label`, upper and lower case being the same, is a class of this map."""
         return label.casefold() in {name.casefold() for name in self.classes}
+
+    def points(self, thing: Thing | str) -> np.ndarray:
+        """(M, 3) points of a thing, metres, map frame: those of the labelled cloud that are its own; maybe none.
+
+        Args:
+            thing: of this map, or its id.
+
+        Raises:
+            UserError: there is no such thing, or the map is not labelled: it says what to do.
+            InputError: the cloud is missing or damaged, or that of another map.
+        """
+        wanted = thing if isinstance(thing, str) else thing.id
+        own = next((other for other in self.things if other.id == wanted), None)
+        if own is None:
+            raise UserError(f"{wanted}: the map of {self.source} has no such thing; ask for one of its things")
+        if self.labels is None:
+            raise UserError(
+                f"the map of {self.source} is not labelled; label its run with `thingmap label OUT` and load it again"
+            )
+        return self.labels.points_of(own)
 
     def find(self, label: str, min_probability: float = 0.0) -> list[Answer]:
         """Things that may be a `label`, likeliest first.

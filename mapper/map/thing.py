@@ -52,6 +52,10 @@ class Thing:
         last_seen: stamp of the last supporting view, seconds.
         evidence: counts of views.
         views: what each of them said, in memory or in the map's evidence file; None where nobody knows. See `explain`.
+        points: of the labelled cloud that are its own; None where nobody knows. `ObjectMap.points` gives them.
+        points_size: (3,) full extents along the box's own axes, metres, that its points suggest where they disagree
+            with `size`; None where they agree, or nobody knows.
+        points_size_std: (3,) standard deviations of `points_size`, metres; None with it.
 
     Raises:
         ValueError: where a shape or a value is not as above; it says which and what was found.
@@ -71,12 +75,20 @@ class Thing:
     last_seen: float
     evidence: Evidence
     views: ThingViews | StoredViews | None = field(default=None, repr=False)
+    points: int | None = None
+    points_size: np.ndarray | None = None
+    points_size_std: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         for name, shape in (("position", (3,)), ("position_covariance", (3, 3)), ("size", (3,)), ("size_std", (3,))):
             object.__setattr__(self, name, _read_only(name, getattr(self, name), shape))
         for name in ("probability", "existence", "yaw", "first_seen", "last_seen"):
             object.__setattr__(self, name, _finite(name, getattr(self, name)))
+        for name in ("points_size", "points_size_std"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, _read_only(name, getattr(self, name), (3,)))
+        if self.points is not None:
+            object.__setattr__(self, "points", operator.index(self.points))
         posterior = {str(label): _finite(f"class_posterior[{label!r}]", p) for label, p in self.class_posterior.items()}
         object.__setattr__(self, "class_posterior", posterior)
         self._check()
@@ -95,12 +107,22 @@ class Thing:
             raise ValueError(f"probability {self.probability} must be class_posterior[{self.label!r}], which is {kept}")
         if np.any(self.size < 0.0) or np.any(self.size_std < 0.0):
             raise ValueError(f"size and size_std must not be negative, but got {self.size} and {self.size_std}")
+        self._check_points()
         covariance = self.position_covariance
         scale = max(float(np.max(np.abs(covariance))), 1e-300)
         if not np.allclose(covariance, covariance.T, rtol=0.0, atol=1e-6 * scale):
             raise ValueError(f"position_covariance must be symmetric, but got {covariance.tolist()}")
         if np.linalg.eigvalsh(covariance)[0] < -1e-6 * scale:
             raise ValueError(f"position_covariance must have no negative eigenvalue, but got {covariance.tolist()}")
+
+    def _check_points(self) -> None:
+        size, std = self.points_size, self.points_size_std
+        if self.points is not None and self.points < 0:
+            raise ValueError(f"points must not be negative, but got {self.points}")
+        if (size is None) is not (std is None):
+            raise ValueError(f"points_size and points_size_std must come together, but got {size} and {std}")
+        if size is not None and std is not None and (np.any(size < 0.0) or np.any(std < 0.0)):
+            raise ValueError(f"points_size and points_size_std must not be negative, but got {size} and {std}")
 
     @property
     def position_std(self) -> np.ndarray:

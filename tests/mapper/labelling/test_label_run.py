@@ -17,6 +17,7 @@ from thingmap.datasets.lidar import NO_CAMERA
 from thingmap.datasets.open import open_sequence
 from thingmap.detectors.detections import Detections
 from thingmap.mapper.export.colors import class_color
+from thingmap.mapper.labelling.instances import Instances, ThingPoints
 from thingmap.mapper.labelling.labelling_config import LabellingConfig, SourceConfig
 from thingmap.mapper.labelling.mrf_config import MrfConfig, Smoothness
 from thingmap.mapper.map.object_map import ObjectMap
@@ -47,13 +48,13 @@ def test_points_are_labelled_and_counted(first):
     content = PlyData.read(str(out / "labels.ply"))
     vertices = content["vertex"].data
     names = ObjectMap.load(out).classes
-    assert content.comments == [f"label {k} {json.dumps(name)}" for k, name in enumerate(names, start=1)]
+    kinds = [line for line in content.comments if line.startswith("label")]
+    assert kinds == [f"label {k} {json.dumps(name)}" for k, name in enumerate(names, start=1)]
     assert len(vertices) == report.voxels == sum(report.points.values())
     for k, name in enumerate(names, start=1):
         own = vertices[vertices["label"] == k]
         assert len(own) == report.points.get(name, 0)
         assert set(zip(own["red"], own["green"], own["blue"], strict=True)) <= {tuple(class_color(name))}
-    assert "instance" not in (vertices.dtype.names or ())
     document = json.loads((out / "map.json").read_text())
     assert document["labels"] == {"file": "labels.ply", "points": report.points}
 
@@ -61,6 +62,9 @@ def test_points_are_labelled_and_counted(first):
 def test_the_map_is_otherwise_as_it_was(first, run):
     before, after = (json.loads((folder / "map.json").read_text()) for folder in (run, first.out))
     del after["labels"]
+    for thing in after["things"]:
+        del thing["points"]
+        assert (thing.pop("points_size", None) is None) == (thing.pop("points_size_std", None) is None)
     assert after == before
     ObjectMap.load(first.out).things[0].explain()  # the evidence file still fits
 
@@ -86,8 +90,11 @@ def test_things_volumes_can_be_left_out(out, first):
 
 
 def test_instances_are_written_where_somebody_finds_them(out):
-    def find(voxels, labels, object_map):
-        return np.where(labels.label >= 0, len(object_map.things), 0)
+    def find(voxels, labels, object_map, config):
+        number = np.where(labels.label >= 0, len(object_map.things), 0)
+        counts = [int(np.sum(number == t)) for t in range(1, len(object_map.things) + 1)]
+        things = [ThingPoints(thing.id, n, None) for thing, n in zip(object_map.things, counts, strict=True)]
+        return Instances(number, tuple(things), ())
 
     report = label(out, find_instances=find)
     object_map = ObjectMap.load(out)
@@ -97,7 +104,8 @@ def test_instances_are_written_where_somebody_finds_them(out):
     assert set(content["vertex"]["instance"].tolist()) == {0, last}
     things = json.loads((out / "map.json").read_text())["things"]
     assert [thing["points"] for thing in things] == [0] * (last - 1) + [report.voxels - report.points["background"]]
-    label(out)
+    label(out, find_instances=None)
+    assert "instance" not in (PlyData.read(str(out / "labels.ply"))["vertex"].data.dtype.names or ())
     assert all("points" not in thing for thing in json.loads((out / "map.json").read_text())["things"])
 
 

@@ -1,0 +1,159 @@
+"""Boxes checked against the labelled cloud (Lai et al., IV-C): one whose label is not that of most points in the middle
+of it is pruned."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import njit
+
+from ...datasets.errors import InputError, UserError
+from ...datasets.frame import Frame
+from ...datasets.stamps import nearest
+from ...datasets.truth import NO_OBJECT
+from ...detectors.detections import Detections
+from ..evaluation.inputs.load_run import load_run
+from ..map.store import OutputFolder
+from ..trajectory.rigid import inverse
+from .gathering import check_classes
+from .mapped_frames import ROUNDING
+
+
+@dataclass(frozen=True, slots=True)
+class ValidationConfig:
+    """How a box is checked.
+
+    Attributes:
+        central: share of a box's width and height that is its central region: a quarter of its area, which lies on the
+            object also where that is round.
+        tolerance: metres that a point may be off the depth measured where it appears: one behind is hidden, one in
+            front is not there any more. Two voxels, the noise of a Kinect at 2 m, and slant.
+        least_points: in the central region, below which nobody knows, and the box stays.
+
+    Raises:
+        UserError: for a value out of range.
+    """
+
+    central: float = 0.5
+    tolerance: float = 0.04
+    least_points: int = 3
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.central <= 1.0 and self.tolerance > 0.0 and self.least_points >= 1):
+            raise UserError(f"expected central in (0, 1], tolerance > 0 and least_points >= 1, but got {self}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Validator:
+    """A labelled map that checks boxes.
+
+    Attributes:
+        points: (M, 3) metres, map frame.
+        labels: (M,) indices into `classes`, `NO_OBJECT` for background.
+        classes: of the map.
+        stamps: (N,) seconds, ascending, of the frames that were mapped.
+        poses: (N, 4, 4) `T_world_camera` of them in the map's frame.
+        config: numbers.
+    """
+
+    points: np.ndarray
+    labels: np.ndarray
+    classes: tuple[str, ...]
+    stamps: np.ndarray
+    poses: np.ndarray
+    config: ValidationConfig = field(default_factory=ValidationConfig)
+
+    @classmethod
+    def load(cls, out: OutputFolder, config: ValidationConfig | None = None) -> Validator:
+        """That of a run's folder.
+
+        Raises:
+            InputError: it holds no run, the run is not labelled, or a file is damaged.
+        """
+        run = load_run(out.path)
+        if not out.labels_file.is_file():
+            raise InputError(out.labels_file, "a labelled cloud", "nothing", f"run `thingmap label {out.path}` first")
+        points, labels = run.cloud()
+        if labels is None:
+            raise InputError(out.labels_file, "labels of points", "none", f"run `thingmap label {out.path}` first")
+        order = np.argsort(run.stamps, kind="stable")
+        poses = (run.stamps[order], run.poses[order])
+        return cls(points, labels, run.object_map.classes, *poses, config or ValidationConfig())
+
+    def pose_at(self, stamp: float) -> np.ndarray | None:
+        """(4, 4) `T_world_camera` of the mapped frame of that stamp in seconds; None where no such frame was mapped."""
+        row = nearest(np.array([stamp]), self.stamps, ROUNDING)[0]
+        return None if row < 0 else self.poses[row]
+
+    def validate(self, detections: Detections, frame: Frame, T_world_camera: np.ndarray) -> np.ndarray:
+        """(D,) bool: which of D detections stay: those whose label is that of most visible points in the middle, or
+        where too few points are seen to know. Of labels that are equally many, any may be the box's.
+
+        Raises:
+            UserError: the detector finds classes that the map does not have.
+        """
+        check_classes(detections.classes, self.classes)
+        uv, rows = visible_points(self.points, frame, T_world_camera, self.config.tolerance)
+        votes = central_votes(detections.xyxy, uv, self.labels[rows], len(self.classes), self.config.central)
+        column = _columns(detections.classes, self.classes)[detections.class_id]
+        agrees = votes[np.arange(len(votes)), column] == votes.max(axis=1, initial=0)
+        return agrees | (votes.sum(axis=1) < self.config.least_points)
+
+
+def visible_points(
+    points: np.ndarray, frame: Frame, T_world_camera: np.ndarray, tolerance: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """(V, 2) pixels, where points appear that the frame sees, and (V,) their rows.
+
+    Args:
+        points: (M, 3) metres, world.
+        frame: with depth; a point is seen where that differs from its own by at most `tolerance`.
+        T_world_camera: (4, 4) of the frame.
+        tolerance: metres.
+    """
+    T_camera_world = inverse(T_world_camera)
+    local = points @ T_camera_world[:3, :3].T + T_camera_world[:3, 3]
+    rows = np.flatnonzero(local[:, 2] > tolerance)
+    uv = frame.intrinsics.project(local[rows])
+    height, width = frame.depth.shape
+    # compared as real numbers: what is far outside would overflow an integer
+    is_inside = ((uv >= -0.5) & (uv < np.array([width, height]) - 0.5)).all(axis=1)
+    uv, rows = uv[is_inside], rows[is_inside]
+    pixel = np.floor(uv + 0.5).astype(np.intp)
+    depth = frame.depth[pixel[:, 1], pixel[:, 0]]
+    is_seen = (depth > 0.0) & (np.abs(local[rows, 2] - depth) <= tolerance)
+    return uv[is_seen], rows[is_seen]
+
+
+def central_votes(xyxy: np.ndarray, uv: np.ndarray, label: np.ndarray, classes: int, central: float) -> np.ndarray:
+    """(D, K + 1) number of points of each label in the central regions of D boxes, the background's last.
+
+    Args:
+        xyxy: (D, 4) boxes; they count from the image's outer edge, half a pixel before the first pixel's centre.
+        uv: (V, 2) pixels of points, whole numbers at centres.
+        label: (V,) 0..K-1, `NO_OBJECT` for background.
+        classes: K.
+        central: share of the width and height.
+    """
+    column = np.where(label == NO_OBJECT, classes, label)
+    middle, half = (xyxy[:, :2] + xyxy[:, 2:]) / 2.0 - 0.5, (xyxy[:, 2:] - xyxy[:, :2]) * central / 2.0
+    return _votes(middle - half, middle + half, uv, column, classes + 1)
+
+
+@njit(cache=True)
+def _votes(low: np.ndarray, high: np.ndarray, uv: np.ndarray, column: np.ndarray, columns: int) -> np.ndarray:
+    votes = np.zeros((len(low), columns), np.int64)
+    for i in range(len(uv)):
+        u, v = uv[i, 0], uv[i, 1]
+        for d in range(len(low)):
+            if low[d, 0] <= u <= high[d, 0] and low[d, 1] <= v <= high[d, 1]:
+                votes[d, column[i]] += 1
+    return votes
+
+
+def _columns(found: Sequence[str], classes: Sequence[str]) -> np.ndarray:
+    """(K',) index in `classes` of each class that a detector knows; upper and lower case are the same."""
+    index = {name.casefold(): k for k, name in enumerate(classes)}
+    return np.array([index[name.casefold()] for name in found], dtype=np.intp)

@@ -1,0 +1,133 @@
+"""Boxes against labelled points, in a hand-made image: a cup before a wall."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from thingmap.datasets.errors import UserError
+from thingmap.datasets.frame import Frame, Intrinsics
+from thingmap.datasets.truth import NO_OBJECT
+from thingmap.detectors.detections import Detections
+from thingmap.mapper.labelling.validation import ValidationConfig, Validator, central_votes, visible_points
+
+CUP, BOWL = 0, 1
+CLASSES = ("Cup", "bowl")
+INTRINSICS = Intrinsics(64, 48, 60.0, 60.0, 31.5, 23.5)
+ON_CUP, ON_WALL = (24.0, 16.0, 40.0, 32.0), (4.0, 4.0, 16.0, 16.0)
+
+
+def make_frame() -> Frame:
+    """A wall at 2 m with a square of 16 x 16 pixels at 1 m in the middle, `ON_CUP`."""
+    depth = np.full((48, 64), 2.0, np.float32)
+    depth[16:32, 24:40] = 1.0
+    return Frame(0, "a", 0.5, np.zeros((48, 64, 3), np.uint8), depth, INTRINSICS)
+
+
+def make_points() -> tuple[np.ndarray, np.ndarray]:
+    """What `make_frame` sees, a point in every second pixel, with labels; and a bowl behind the cup, which it does not
+    see."""
+    frame = make_frame()
+    v, u = np.mgrid[0:48:2, 0:64:2].reshape(2, -1)
+    seen = INTRINSICS.back_project(np.stack([u, v], axis=1), frame.depth[v, u].astype(np.float64))
+    hidden = seen[seen[:, 2] == 1.0] * 1.3
+    hidden = np.concatenate([hidden, hidden * 1.02])
+    label = np.where(seen[:, 2] == 1.0, CUP, NO_OBJECT)
+    return np.concatenate([seen, hidden]), np.append(label, np.full(len(hidden), BOWL))
+
+
+def make_validator(points, labels, **config) -> Validator:
+    return Validator(points, labels, CLASSES, np.array([0.5]), np.eye(4)[None], ValidationConfig(**config))
+
+
+def boxes(*claims, classes=("cup", "bowl")) -> Detections:
+    """(box, class) pairs as detections."""
+    return Detections.from_best_class(
+        classes, [box for box, _ in claims], [k for _, k in claims], np.full(len(claims), 0.7)
+    )
+
+
+def test_boxes_stay_where_the_points_in_the_middle_agree():
+    validator = make_validator(*make_points())
+    found = boxes((ON_CUP, CUP), (ON_CUP, BOWL), (ON_WALL, CUP), (ON_WALL, BOWL))
+    assert validator.validate(found, make_frame(), np.eye(4)).tolist() == [True, False, False, False]
+
+
+def test_classes_are_told_by_name_and_not_by_number():
+    found = boxes((ON_CUP, 1), (ON_CUP, 0), classes=("bowl", "cup"))
+    assert make_validator(*make_points()).validate(found, make_frame(), np.eye(4)).tolist() == [True, False]
+    with pytest.raises(UserError, match="sofa"):
+        make_validator(*make_points()).validate(boxes((ON_CUP, 0), classes=("sofa",)), make_frame(), np.eye(4))
+
+
+def test_only_the_middle_counts():
+    wide = (12.0, 4.0, 52.0, 44.0)  # 40 x 40 pixels around the cup's 16 x 16
+    frame, found = make_frame(), boxes((wide, CUP))
+    assert make_validator(*make_points(), central=0.4).validate(found, frame, np.eye(4)).all()
+    assert not make_validator(*make_points(), central=0.9).validate(found, frame, np.eye(4)).any()
+
+
+def test_what_no_points_speak_of_stays():
+    points, labels = make_points()
+    nothing = make_validator(points[:0], labels[:0])
+    assert nothing.validate(boxes((ON_CUP, BOWL)), make_frame(), np.eye(4)).all()
+    dark = make_frame()
+    dark.depth[:] = 0.0
+    assert make_validator(points, labels).validate(boxes((ON_CUP, BOWL)), dark, np.eye(4)).all()
+    assert make_validator(points, labels).validate(Detections.empty(("cup",)), make_frame(), np.eye(4)).shape == (0,)
+
+
+def test_a_moved_camera_sees_the_same():
+    """A camera that stands elsewhere, and points of the world that stand as they did before it."""
+    turn = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    T_world_camera = np.eye(4)
+    T_world_camera[:3, :3], T_world_camera[:3, 3] = turn, (3.0, -1.0, 0.5)
+    points, labels = make_points()
+    validator = make_validator(points @ turn.T + T_world_camera[:3, 3], labels)
+    found = boxes((ON_CUP, CUP), (ON_CUP, BOWL), (ON_WALL, CUP))
+    assert validator.validate(found, make_frame(), T_world_camera).tolist() == [True, False, False]
+
+
+def test_only_what_the_depth_shows_is_visible():
+    frame = make_frame()
+    points = np.array([[0, 0, 1.0], [0, 0, 1.03], [0, 0, 1.05], [0, 0, 0.95], [0, 0, -1.0], [0.5, 0, 2.0], [1.1, 0, 2]])
+    uv, rows = visible_points(points, frame, np.eye(4), 0.04)
+    assert rows.tolist() == [0, 1, 5]
+    assert uv[0] == pytest.approx([31.5, 23.5]) and uv[2] == pytest.approx([46.5, 23.5])
+
+
+def test_the_edges_of_the_image():
+    frame = make_frame()
+    uv = np.array([[-0.5, 0.0], [-0.51, 0.0], [63.49, 47.49], [63.5, 47.0], [0.0, 47.51]])
+    points = INTRINSICS.back_project(uv, np.full(len(uv), 2.0))
+    assert visible_points(points, frame, np.eye(4), 0.04)[1].tolist() == [0, 2]
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(0.1, 1.0))
+def test_votes_are_what_counting_gives(seed, central):
+    rng = np.random.default_rng(seed)
+    corner = rng.uniform(0, 30, (5, 2))
+    xyxy = np.concatenate([corner, corner + rng.uniform(1, 30, (5, 2))], axis=1)
+    uv, label = rng.uniform(0, 60, (80, 2)), rng.choice([NO_OBJECT, 0, 1], 80)
+    votes = central_votes(xyxy, uv, label, 2, central)
+    for d, (left, top, right, bottom) in enumerate(xyxy):
+        across, down = (right - left) * (1 - central) / 2, (bottom - top) * (1 - central) / 2
+        edge = uv + 0.5  # boxes count from the image's outer edge
+        inside = (edge[:, 0] >= left + across) & (edge[:, 0] <= right - across)
+        inside &= (edge[:, 1] >= top + down) & (edge[:, 1] <= bottom - down)
+        assert votes[d].tolist() == [int(np.sum(inside & (label == k))) for k in (0, 1, NO_OBJECT)]
+
+
+def test_poses_are_those_of_mapped_frames():
+    validator = make_validator(*make_points())
+    assert validator.pose_at(0.5) is not None and validator.pose_at(0.5000004) is not None
+    assert validator.pose_at(0.6) is None
+
+
+@pytest.mark.parametrize("wrong", [{"central": 0.0}, {"central": 1.1}, {"tolerance": 0.0}, {"least_points": 0}])
+def test_numbers_out_of_range_are_refused(wrong):
+    with pytest.raises(UserError):
+        ValidationConfig(**wrong)
