@@ -121,7 +121,8 @@ def describe(judged: Sequence[JudgedScene], limits: Thresholds) -> str:
             level_table(groups),
             f"Thresholds: {chosen}. Detector: {np.median([scene.milliseconds for scene in judged]):.0f} ms a frame, "
             "beside other jobs. The tracks are those of the paper with the share of 60 % taken of the views that could "
-            "show a track; they are ranked by what their views say on average. Things of a graph are drawn into every frame, hidden there or not.",
+            "show a track; they are ranked by what their views say on average. Things of a graph "
+            "are drawn into every frame, hidden there or not.",
         ]
     )
 
