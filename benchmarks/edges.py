@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +18,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from results import show_section, table
+from timing import least_ms
 
 from thingmap.datasets.errors import UserError
 from thingmap.datasets.frame import Frame
@@ -174,18 +174,8 @@ def stage_rows(frames: list[Frame]) -> list[tuple[str, str, str]]:
             ),
         }
         for name, stage in stages.items():
-            costs.setdefault(name, []).append(_least_ms(stage))
+            costs.setdefault(name, []).append(least_ms(stage, REPEATS))
     return [(name, f"{np.mean(values):.1f}", f"{max(values):.1f}") for name, values in costs.items()]
-
-
-def _least_ms(stage: Callable[[], object]) -> float:
-    stage()
-    costs = []
-    for _ in range(REPEATS):
-        start = time.process_time()
-        stage()
-        costs.append(time.process_time() - start)
-    return 1000.0 * min(costs)
 
 
 def draw_all(options: argparse.Namespace) -> None:

@@ -21,6 +21,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from timing import StageLines
 
 from thingmap.datasets.errors import UserError
 from thingmap.datasets.object_views.backgrounds import Backgrounds
@@ -97,7 +98,7 @@ def train_model(folder: Path, channels: Channels, quick: bool = False) -> Path:
     views, backgrounds, names = material(folder, quick)
     config = replace(QUICK_CONFIG if quick else CONFIG, channels=channels)
     start = time.perf_counter()
-    model = train(views, backgrounds, config, _Stages(), checkpoint, names)
+    model = train(views, backgrounds, config, StageLines(), checkpoint, names)
     model.save(file)
     checkpoint.unlink(missing_ok=True)
     said = f"{len(views)} views, {len(backgrounds)} backgrounds, {(time.perf_counter() - start) / 60.0:.1f} min"
@@ -147,19 +148,6 @@ def rendered(folder: Path, config: SyntheticConfig) -> Path:
     if not (place / "poses.txt").is_file():  # the last file but one that is written
         write_sequence(SyntheticSequence(config), place, overwrite=True)
     return place
-
-
-class _Stages:
-    """A line on stderr for every stage that is done."""
-
-    def __init__(self) -> None:
-        self._start = time.perf_counter()
-
-    def __call__(self, stage: str, done: int, total: int) -> None:
-        if done == total:
-            seconds = time.perf_counter() - self._start
-            self._start = time.perf_counter()
-            print(f"{stage}: {total} in {seconds:.0f} s", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +21,7 @@ import proposal_pictures
 from proposal_scores import report
 from proposal_truth import FARTHEST, LEAST_PIXELS, Match, match, rendered
 from results import show_section, table
+from timing import least_ms
 
 from thingmap.datasets.errors import UserError
 from thingmap.datasets.frame import Frame
@@ -178,20 +178,10 @@ def stage_table(frames: list[Frame]) -> str:
             "whole detector, with masks": lambda f=frame: detector(f),
         }
         for name, stage in stages.items():
-            costs.setdefault(name, []).append(_least_ms(stage))
+            costs.setdefault(name, []).append(least_ms(stage, REPEATS))
     size = frames[0].depth.shape
     rows = [(name, f"{np.mean(values):.1f}", f"{max(values):.1f}") for name, values in costs.items()]
     return f"Time at {size[1]} x {size[0]}, one core, ms of CPU:\n\n" + table(("stage", "mean", "most"), rows)
-
-
-def _least_ms(stage: Callable[[], object]) -> float:
-    stage()
-    costs = []
-    for _ in range(REPEATS):
-        start = time.process_time()
-        stage()
-        costs.append(time.process_time() - start)
-    return 1000.0 * min(costs)
 
 
 def draw_all(options: argparse.Namespace) -> None:

@@ -20,6 +20,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from hog_model import INSTANCES, TURNTABLE, models, rendered, scene_configs, scene_name
+from timing import StageLines
 
 from thingmap.datasets.errors import UserError
 from thingmap.datasets.object_views.backgrounds import Backgrounds
@@ -85,7 +86,7 @@ def train_model(
     file.parent.mkdir(parents=True, exist_ok=True)
     views, backgrounds, names = material(folder, quick)
     start = time.perf_counter()
-    model = train(views, backgrounds, config or (QUICK_CONFIG if quick else CONFIG), _Stages(), checkpoint, names)
+    model = train(views, backgrounds, config or (QUICK_CONFIG if quick else CONFIG), StageLines(), checkpoint, names)
     model.save(file)
     checkpoint.unlink(missing_ok=True)
     said = f"{len(views)} views, {len(backgrounds)} backgrounds, {(time.perf_counter() - start) / 60.0:.1f} min"
@@ -109,19 +110,6 @@ def _chosen(model: ShapeContextModel) -> str:
     return (
         f"radius {100 * model.about['radius']:g} cm, {entries} descriptors of classes, rivals {model.about['rivals']}"
     )
-
-
-class _Stages:
-    """A line on stderr for every stage that is done."""
-
-    def __init__(self) -> None:
-        self._start = time.perf_counter()
-
-    def __call__(self, stage: str, done: int, total: int) -> None:
-        if done == total:
-            seconds = time.perf_counter() - self._start
-            self._start = time.perf_counter()
-            print(f"{stage}: {total} in {seconds:.0f} s", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

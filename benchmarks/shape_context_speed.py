@@ -12,7 +12,6 @@ import argparse
 import multiprocessing
 import os
 import sys
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +20,7 @@ import cv2
 import numba
 import numpy as np
 from results import show_section, table
+from timing import least_ms
 
 from thingmap.datasets.errors import UserError
 from thingmap.datasets.frame import Frame
@@ -145,9 +145,7 @@ def time_stages(detector: ShapeContextDetector, frame: Frame, times: Times, repe
         "matching of rivals": rival_matching,
     }
     rest = {"scores": lambda: score_proposals(described, labels, found.xyxy, books, config, rivals)}
-    costs = {
-        name: _least_ms(work, repeats) for name, work in (stages | rest | {WHOLE: lambda: detector(frame)}).items()
-    }
+    costs = {name: least_ms(work, repeats) for name, work in (stages | rest | {WHOLE: lambda: detector(frame)}).items()}
     # votes to verification have no call of their own: what is left of the scores
     inner = costs["matching"] + costs["matching of rivals"]
     costs[REST] = max(costs.pop("scores") - inner, 0.0)
@@ -173,16 +171,6 @@ def describe(model: ShapeContextModel, times: Times, size: tuple[int, int], samp
         + "; ".join(said)
         + ". Owners and samples, and what the stages pass on, are in the whole too."
     )
-
-
-def _least_ms(work: Callable[[], object], repeats: int) -> float:
-    work()
-    costs = []
-    for _ in range(repeats):
-        start = time.process_time()
-        work()
-        costs.append(1e3 * (time.process_time() - start))
-    return min(costs)
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:

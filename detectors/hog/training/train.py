@@ -13,14 +13,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
-from hashlib import sha256
 from importlib.metadata import version
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from ....datasets.object_views.backgrounds import Backgrounds
 from ....datasets.object_views.object_view import ObjectViews
+from ...training.digest import names_digest
 from ..model import HogModel
 from .calibration import calibrated
 from .checkpoint import load_checkpoint, save_checkpoint
@@ -58,7 +57,7 @@ def train(
     check_installed()
     config = config or TrainConfig()
     material = gather(views, backgrounds, config, on_progress)
-    settings = _settings(material, config, sources) | {"names": _digest(views, backgrounds)}
+    settings = _settings(material, config, sources) | {"names": names_digest(views, backgrounds)}
     rounds = _resume_or_start(material, config, checkpoint, settings, on_progress)
     for number in range(rounds, config.rounds):
         active = [learner for learner in material.learners if not learner.done]
@@ -140,12 +139,6 @@ def _settings(material: Material, config: TrainConfig, sources: Sequence[str]) -
         "counts": material.counts,
         "thingmap": version("thingmap"),
     }
-
-
-def _digest(views: ObjectViews, backgrounds: Backgrounds) -> str:
-    """Tells other views and frames from these where their numbers are equal."""
-    names = (entry.name for entry in views.entries), backgrounds.names
-    return sha256("\n".join(chain(*names)).encode()).hexdigest()[:16]
 
 
 def _about(material: Material, settings: dict[str, Any], rounds: int) -> dict[str, Any]:

@@ -13,9 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from hashlib import sha256
 from importlib.metadata import version
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +22,7 @@ import numpy as np
 from ....datasets.errors import UserError
 from ....datasets.object_views.backgrounds import Backgrounds
 from ....datasets.object_views.object_view import ObjectViews
+from ...training.digest import names_digest
 from ..codebook import Codebook
 from ..model import ShapeContextModel
 from .calibrating import fit, gather_samples
@@ -188,11 +187,10 @@ def _settings(
 ) -> dict[str, Any]:
     """All that the model depends on, as JSON; views and frames by a digest of their names."""
     numbers = {name: value for name, value in asdict(config).items() if name != "memory"}
-    names = chain((entry.name for entry in views.entries), backgrounds.names)
     return {
         **numbers,
         "radii": list(config.radii),
         "sources": list(sources),
-        "names": sha256("\n".join(names).encode()).hexdigest()[:16],
+        "names": names_digest(views, backgrounds),
         "thingmap": version("thingmap"),
     }
