@@ -29,7 +29,8 @@ from thingmap.mapper.evaluation.protocols import meger
 from thingmap.mapper.evaluation.result import NotEvaluated
 from thingmap.mapper.evaluation.things.matching import match_ranked
 from thingmap.mapper.evaluation.uncertainty.claims import class_claims, existence_claims
-from thingmap.mapper.map.object_map import MapFrame, ObjectMap, UpDirection
+from thingmap.mapper.map.object_map import MapFrame, ObjectMap
+from thingmap.mapper.map.up_direction import UpDirection
 from thingmap.mapper.mapper import SemanticMapper
 
 VIEWS = tuple(range(2, 13))  # Explicit Occlusion, figure 6, has 2 to 6; Clutter, VI-C, has 3, 7, 10 and 12

@@ -33,7 +33,8 @@ from .estimation.outcomes import Outcome
 from .estimation.scene import Scene
 from .estimation.view import View
 from .map.compose import compose_things
-from .map.object_map import PROBABLE, ObjectMap
+from .map.object_map import ObjectMap
+from .queries.answer import PROBABLE
 from .stages import StageClock
 from .trajectory.camera import CameraGraph
 from .trajectory.cloud import KeyframeCloud
@@ -203,6 +204,7 @@ class SemanticMapper:
             source=self._source,
             frame=self._camera.map_frame,
             up=self._camera.up(),
+            camera=self._camera.intrinsics if self._camera.started else None,
         )
 
     def trajectory(self) -> tuple[np.ndarray, np.ndarray]:

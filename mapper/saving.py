@@ -8,8 +8,9 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from .map.atomic import replacing
-from .map.object_map import PROBABLE, ObjectMap
+from .map.object_map import ObjectMap
 from .map.store import OutputFolder
+from .queries.answer import PROBABLE
 from .run_report import RunReport
 from .runner import Mapper
 

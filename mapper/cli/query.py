@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from ..map.object_map import Answer, ObjectMap
+    from ..map.object_map import ObjectMap
+    from ..queries.answer import Answer
 
 LISTED = 30  # labels named in a message
 

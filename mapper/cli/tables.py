@@ -11,8 +11,8 @@ from ..map.text import probability_text
 
 if TYPE_CHECKING:
     from ..map.explanation import Explanation
-    from ..map.object_map import Answer
     from ..map.thing import Thing
+    from ..queries.answer import Answer
 
 WIDTH = 1000  # columns: a row stays one line, whatever the terminal or the file
 EXPLAINED_WIDTH = 100  # columns where the output is no terminal

@@ -11,15 +11,18 @@ from typing import Any
 import numpy as np
 
 from ...datasets.errors import InputError
+from ...datasets.frame import Intrinsics
 from ...datasets.json_record import JsonRecord
 from .atomic import make_folder, write_atomic
 from .labelled_cloud import LabelledCloud
-from .object_map import MapFrame, ObjectMap, UpDirection
+from .object_map import MapFrame, ObjectMap
 from .thing import Evidence, Thing
+from .up_direction import UpDirection
 from .views_file import EvidenceFile, StoredViews, evidence_path, write_views
 
 SCHEMA = "thingmap/1"
 FILE_NAME = "map.json"
+CLOUD_NAME = "cloud.ply"
 DOUBTFUL_BELOW = 0.5  # existence: what more likely is not there is not written, unless asked for
 REMEDY = "correct that value or write the map again with `thingmap run`"
 NEGLIGIBLE = 1e-4  # class probability that is not written
@@ -72,6 +75,7 @@ def to_document(object_map: ObjectMap, include_doubtful: bool = False) -> dict[s
     a sum of 1 belongs to the classes that are absent, and dividing by the sum renormalises.
     """
     up, labels = object_map.up, object_map.labels
+    camera = {} if object_map.camera is None else {"camera": asdict(object_map.camera)}
     labelled = {} if labels is None else {"labels": {"file": labels.file.name, "points": dict(labels.points)}}
     return {
         "schema": SCHEMA,
@@ -82,6 +86,7 @@ def to_document(object_map: ObjectMap, include_doubtful: bool = False) -> dict[s
             "std_deg": float(np.degrees(up.std_rad)),
             "source": up.source,
         },
+        **camera,
         "classes": list(object_map.classes),
         **labelled,
         "things": [thing_to_dict(thing) for thing in _written(object_map, include_doubtful)],
@@ -108,6 +113,8 @@ def from_document(document: Any, file: Path) -> ObjectMap:
             frame=MapFrame(root.choice("frame", tuple(MapFrame))),
             up=_up_from(up),
             labels=_labels_of(root, file),
+            camera=_camera_from(root.record("camera")) if "camera" in root else None,
+            cloud=_cloud_beside(file),
         )
 
 
@@ -206,3 +213,14 @@ def _up_from(record: JsonRecord) -> UpDirection:
         return UpDirection(
             record.array("direction", (3,)), float(np.radians(record.number("std_deg"))), record.text("source")
         )
+
+
+def _camera_from(record: JsonRecord) -> Intrinsics:
+    width, height = record.count("width"), record.count("height")
+    return Intrinsics(width, height, *(record.number(name) for name in ("fx", "fy", "cx", "cy")))
+
+
+def _cloud_beside(file: Path) -> Path | None:
+    """The cloud of the run that wrote `map.json`; a map in a file of its own has none."""
+    cloud = file.with_name(CLOUD_NAME)
+    return cloud if file.name == FILE_NAME and cloud.is_file() else None

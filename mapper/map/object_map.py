@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -11,14 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...datasets.errors import UserError
-from .region import as_region, probability_inside
+from ..queries.names import NameQuestions
+from ..queries.places import PlaceQuestions
 from .thing import Thing
+from .up_direction import UpDirection
 from .upright import upright_rotation
 
 if TYPE_CHECKING:
+    from ...datasets.frame import Intrinsics
     from .labelled_cloud import LabelledCloud
-
-PROBABLE = 0.5  # by default a question about places is answered with what is more likely true than not
 
 
 class MapFrame(StrEnum):
@@ -30,48 +30,7 @@ class MapFrame(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class UpDirection:
-    """Which way is up in the map: (3,) unit `direction`, the standard deviation of its angle, and who says so.
-
-    `source` is such as "planes", "gravity file", "accelerometer" or "camera prior"; `std_rad` is in radians.
-    """
-
-    direction: np.ndarray
-    std_rad: float
-    source: str
-
-    def __post_init__(self) -> None:
-        direction = np.array(self.direction, dtype=np.float64)
-        length = np.linalg.norm(direction)
-        if direction.shape != (3,) or not abs(length - 1.0) < 1e-3:
-            raise ValueError(f"up direction must be a (3,) unit vector, but got {self.direction!r}")
-        if not 0.0 <= float(self.std_rad) < np.inf:
-            raise ValueError(f"std_rad must be a finite number >= 0, but got {self.std_rad!r}")
-        direction /= length
-        direction.setflags(write=False)
-        object.__setattr__(self, "direction", direction)
-        object.__setattr__(self, "std_rad", float(self.std_rad))
-
-
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """One thing that answers a question.
-
-    Attributes:
-        thing: with its covariance and its whole class posterior.
-        probability: P(the thing is what was asked for); with a region, also that its centre is in there.
-        distance: metres from the point asked about to the thing's centre, None where no point was.
-        distance_std: standard deviation of `distance`, metres, from the position's covariance.
-    """
-
-    thing: Thing
-    probability: float
-    distance: float | None = None
-    distance_std: float | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ObjectMap:
+class ObjectMap(NameQuestions, PlaceQuestions):
     """Things in one frame of reference.
 
     Attributes:
@@ -81,6 +40,8 @@ class ObjectMap:
         frame: whose axes positions are in.
         up: needed to place the upright boxes.
         labels: the cloud whose points are labelled, where `thingmap label` wrote one.
+        camera: that mapped it, where one did; the default for questions about views.
+        cloud: PLY file of what was seen, which hides what is behind it; where the map was read with one beside it.
     """
 
     things: tuple[Thing, ...]
@@ -89,6 +50,8 @@ class ObjectMap:
     frame: MapFrame
     up: UpDirection
     labels: LabelledCloud | None = None
+    camera: Intrinsics | None = None
+    cloud: Path | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "things", tuple(self.things))
@@ -129,10 +92,6 @@ class ObjectMap:
         """(3, 3) axes of the upright frame in which boxes are measured; argument of `Thing.corners`."""
         return upright_rotation(self.up.direction)
 
-    def knows(self, label: str) -> bool:
-        """Whether `label`, upper and lower case being the same, is a class of this map."""
-        return label.casefold() in {name.casefold() for name in self.classes}
-
     def points(self, thing: Thing | str) -> np.ndarray:
         """(M, 3) points of a thing, metres, map frame: those of the labelled cloud that are its own; maybe none.
 
@@ -143,79 +102,9 @@ class ObjectMap:
             UserError: there is no such thing, or the map is not labelled: it says what to do.
             InputError: the cloud is missing or damaged, or that of another map.
         """
-        wanted = thing if isinstance(thing, str) else thing.id
-        own = next((other for other in self.things if other.id == wanted), None)
-        if own is None:
-            raise UserError(f"{wanted}: the map of {self.source} has no such thing; ask for one of its things")
+        own = self.thing(thing)
         if self.labels is None:
             raise UserError(
                 f"the map of {self.source} is not labelled; label its run with `thingmap label OUT` and load it again"
             )
         return self.labels.points_of(own)
-
-    def find(self, label: str, min_probability: float = 0.0) -> list[Answer]:
-        """Things that may be a `label`, likeliest first.
-
-        Each is ranked by existence times the probability of *that* label in its own posterior, so a thing that is
-        likelier a bowl is still found as a cup. Things that cannot be a `label` are left out; an unknown label gives
-        an empty list.
-        """
-        answers = [Answer(thing, thing.belief(label)) for thing in self.things]
-        answers = [answer for answer in answers if answer.probability >= min_probability and answer.probability > 0.0]
-        return sorted(answers, key=lambda answer: (-answer.probability, answer.thing.id))
-
-    def nearest(
-        self,
-        point: Iterable[float],
-        label: str | None = None,
-        count: int | None = None,
-        min_probability: float = PROBABLE,
-    ) -> list[Answer]:
-        """Things by the distance of their centres from `point` (3,), metres, map frame; nearest first.
-
-        Args:
-            point: where to measure from.
-            label: only things that are one with at least `min_probability`; None for things of any class, by existence.
-            count: how many; None for all.
-            min_probability: of being what was asked for.
-        """
-        origin = np.asarray(point, dtype=np.float64)
-        if origin.shape != (3,) or not np.all(np.isfinite(origin)):
-            raise ValueError(f"point must be three finite numbers, but got {point!r}")
-        answers = [
-            Answer(thing, probability, *_distance(origin, thing))
-            for thing, probability in self._asked_for(label, min_probability)
-        ]
-        return sorted(answers, key=lambda answer: (answer.distance, answer.thing.id))[:count]
-
-    def within(self, region: object, label: str | None = None, min_probability: float = PROBABLE) -> list[Answer]:
-        """Things whose centre is in a region with at least `min_probability`, likeliest first.
-
-        Args:
-            region: `((xmin, ymin, zmin), (xmax, ymax, zmax))` or `(centre, radius)`, metres, map frame.
-            label: as for `nearest`.
-            min_probability: of existing, being a `label` and having its centre inside, all three.
-        """
-        where = as_region(region)
-        answers = [
-            Answer(thing, probability * probability_inside(where, thing.position, thing.position_covariance))
-            for thing, probability in self._asked_for(label, min_probability)
-        ]
-        answers = [answer for answer in answers if answer.probability >= min_probability and answer.probability > 0.0]
-        return sorted(answers, key=lambda answer: (-answer.probability, answer.thing.id))
-
-    def _asked_for(self, label: str | None, min_probability: float) -> list[tuple[Thing, float]]:
-        asked = [(thing, thing.existence if label is None else thing.belief(label)) for thing in self.things]
-        return [(thing, p) for thing, p in asked if p >= min_probability and p > 0.0]
-
-
-def _distance(origin: np.ndarray, thing: Thing) -> tuple[float, float]:
-    """|p - origin| and its first-order standard deviation sqrt(u' C u), u the unit direction; at the centre itself,
-    where there is no direction, the widest one is taken."""
-    offset = thing.position - origin
-    distance = float(np.linalg.norm(offset))
-    if distance < 1e-9:
-        variance = np.linalg.eigvalsh(thing.position_covariance)[-1]
-    else:
-        variance = offset @ thing.position_covariance @ offset / distance**2
-    return distance, float(np.sqrt(max(variance, 0.0)))

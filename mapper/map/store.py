@@ -13,6 +13,7 @@ import numpy as np
 from ...datasets.errors import InputError, UserError
 from .atomic import make_folder, replacing, write_atomic
 from .cloud_file import AGAIN, read_cloud, write_cloud, write_labels
+from .map_file import CLOUD_NAME
 from .map_file import FILE_NAME as MAP_FILE
 from .object_map import ObjectMap
 from .views_file import evidence_path
@@ -84,7 +85,7 @@ class OutputFolder:
     @property
     def cloud_file(self) -> Path:
         """Coloured points, map frame, metres."""
-        return self.path / "cloud.ply"
+        return self.path / CLOUD_NAME
 
     @property
     def labels_file(self) -> Path:

@@ -108,7 +108,14 @@ class TrackMapper(SemanticMapper):
             numbers = self.config.lifting, self.config.multiview
             composer = Composer(self._classes or (), self._views, poses, R_world_upright, assessment, *numbers)
             things = composer.things(include_doubtful)
-        return ObjectMap(things, self._classes or (), self._source, self._camera.map_frame, up)
+        return ObjectMap(
+            things,
+            self._classes or (),
+            self._source,
+            self._camera.map_frame,
+            up,
+            camera=self._camera.intrinsics if self._camera.started else None,
+        )
 
     def point_labels(self) -> np.ndarray | None:
         """(M,) int64 class of every point of `cloud()`, `NO_OBJECT` (-1) for background.

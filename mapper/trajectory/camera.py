@@ -13,7 +13,8 @@ from ..config import MapperConfig, OdometrySource
 from ..estimation.records import Up, Visual
 from ..estimation.smoother import Smoother
 from ..estimation.view import View
-from ..map.object_map import MapFrame, UpDirection
+from ..map.object_map import MapFrame
+from ..map.up_direction import UpDirection
 from ..map.upright import upright_rotation
 from .constellation.candidates import LoopCandidate
 from .depth_points import DepthPoints

@@ -17,8 +17,9 @@ from thingmap.datasets.frame import BrokenFrame, Frame, FrameProblem, Intrinsics
 from thingmap.datasets.synthetic.sample import TabletopSequence, open_sample
 from thingmap.detectors.detections import Detections
 from thingmap.detectors.simulated import SimulatedDetector
-from thingmap.mapper.map.object_map import MapFrame, ObjectMap, UpDirection
+from thingmap.mapper.map.object_map import MapFrame, ObjectMap
 from thingmap.mapper.map.thing import Evidence, Thing
+from thingmap.mapper.map.up_direction import UpDirection
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 

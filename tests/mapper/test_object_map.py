@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from thingmap.mapper.map.object_map import MapFrame, UpDirection
+from thingmap.mapper.map.object_map import MapFrame
+from thingmap.mapper.map.up_direction import UpDirection
 
 
 def ids(answers):

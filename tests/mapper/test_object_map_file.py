@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 
 from thingmap.datasets.errors import InputError
 from thingmap.mapper.map.map_file import format_document, from_document, to_document
-from thingmap.mapper.map.object_map import MapFrame, ObjectMap, UpDirection
+from thingmap.mapper.map.object_map import MapFrame, ObjectMap
 from thingmap.mapper.map.thing import Evidence, Thing
+from thingmap.mapper.map.up_direction import UpDirection
 
 labels = st.text(st.characters(exclude_categories=("Cs",)), min_size=1, max_size=12)
 reals = st.floats(-1e6, 1e6)

@@ -10,9 +10,10 @@ import pytest
 
 from thingmap.datasets.errors import InputError, UserError
 from thingmap.datasets.truth import NO_OBJECT
-from thingmap.mapper.map.object_map import MapFrame, ObjectMap, UpDirection
+from thingmap.mapper.map.object_map import MapFrame, ObjectMap
 from thingmap.mapper.map.store import OutputFolder
 from thingmap.mapper.map.thing import Evidence, Thing
+from thingmap.mapper.map.up_direction import UpDirection
 
 POINTS = np.array([[0.0, 0.0, 0.25], [1.0, 0.5, 0.0], [0.5, 0.0, 0.0], [2.0, 0.0, 0.0], [0.25, 0.0, 0.125]])
 LABELS = np.array([0, 1, 0, NO_OBJECT, 0])

@@ -18,8 +18,9 @@ from thingmap.datasets.truth import NO_OBJECT, FrameTruth, PointTruth, TrueObjec
 from thingmap.detectors.detections import Detections
 from thingmap.mapper.evaluation.inputs.case import KeyframePoses, MappedRun, Snapshot
 from thingmap.mapper.map.boxes import box_corners
-from thingmap.mapper.map.object_map import MapFrame, ObjectMap, UpDirection
+from thingmap.mapper.map.object_map import MapFrame, ObjectMap
 from thingmap.mapper.map.thing import Evidence, Thing
+from thingmap.mapper.map.up_direction import UpDirection
 from thingmap.mapper.map.upright import upright_rotation
 
 CLASSES = ("bowl", "cereal box", "cup", "soda can")

@@ -6,8 +6,9 @@ import numpy as np
 
 from thingmap.mapper.labelling.labelling import Labels
 from thingmap.mapper.labelling.voxel_merge import Voxels
-from thingmap.mapper.map.object_map import MapFrame, ObjectMap, UpDirection
+from thingmap.mapper.map.object_map import MapFrame, ObjectMap
 from thingmap.mapper.map.thing import Evidence, Thing
+from thingmap.mapper.map.up_direction import UpDirection
 
 CLASSES = ("cup", "bowl")
 

@@ -1,0 +1,41 @@
+"""What questions may read of a map; `ObjectMap` fills it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...datasets.errors import UserError
+from ..map.thing import Thing
+
+if TYPE_CHECKING:
+    from ...datasets.frame import Intrinsics
+    from ..map.up_direction import UpDirection
+
+
+class MapContent:
+    """Base of the classes of questions, which are methods of `ObjectMap`; its attributes are documented there."""
+
+    __slots__ = ()
+
+    things: tuple[Thing, ...]
+    classes: tuple[str, ...]
+    source: str
+    up: UpDirection
+    camera: Intrinsics | None
+    cloud: Path | None
+
+    @property
+    def R_world_upright(self) -> np.ndarray:
+        """(3, 3) axes of the upright frame in which boxes are measured; argument of `Thing.corners`."""
+        raise NotImplementedError
+
+    def thing(self, which: Thing | str) -> Thing:
+        """The thing of this map that has an id, or the id of `which`; raises `UserError` where there is none."""
+        wanted = which if isinstance(which, str) else which.id
+        own = next((other for other in self.things if other.id == wanted), None)
+        if own is None:
+            raise UserError(f"{wanted}: the map of {self.source} has no such thing; ask for one of its things")
+        return own
