@@ -1,0 +1,1 @@
+"""What people correct in a map: recorded, undoable, kept."""

@@ -1,0 +1,1 @@
+"""Maps on a screen: while they grow, and as a page."""

@@ -1,0 +1,1 @@
+"""One HTML file that shows a map and needs nothing else."""
