@@ -101,7 +101,8 @@ class CameraGraph:
         self._jumped = self._tracking.outcome is TrackingOutcome.LOST and not was_lost
         self.tracked[self._tracking.outcome] += 1
         T = self._tracking.T_odometry_camera
-        if self._selector.is_keyframe(T, self._tracking.outcome) or not self.started:
+        wanted = self._selector.is_keyframe(T, self._tracking.outcome, every=self._sparse.doubtful)
+        if wanted or not self.started:
             return True
         self._T_keyframe_camera = self._frames.append(frame.stamp, T, self.smoother.keyframes - 1, False)
         return False

@@ -24,11 +24,18 @@ class KeyframeSelector:
         self._since = 0
         self._lost = False
 
-    def is_keyframe(self, T: np.ndarray, outcome: TrackingOutcome = TrackingOutcome.GOOD) -> bool:
-        """`T`: (4, 4) odometry pose of this frame, and how it was found. Remembers it when the answer is yes."""
+    def is_keyframe(self, T: np.ndarray, outcome: TrackingOutcome = TrackingOutcome.GOOD, every: bool = False) -> bool:
+        """Remembers it when the answer is yes.
+
+        Args:
+            T: (4, 4) odometry pose of this frame.
+            outcome: how it was found.
+            every: frames are so few that each is wanted, moved or not.
+        """
         self._since += 1
         was_lost, self._lost = self._lost, outcome is TrackingOutcome.LOST
-        if self._T_last is not None and self._lost == was_lost and not self._moved(inverse(self._T_last) @ T):
+        last = None if every or self._lost != was_lost else self._T_last
+        if last is not None and not self._moved(inverse(last) @ T):
             return False
         self._T_last, self._since = T, 0
         return True

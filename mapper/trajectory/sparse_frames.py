@@ -9,10 +9,11 @@ disagree by beyond what they claim is the noise that neither knows of.
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 
-from ..config import SparseConfig
+from ..config import LoopConfig, SparseConfig
 from .rigid import pose_covariance, tangent
 
 TAIL = (0.9, 1.645)  # share of absolute values, and how many deviations of a Gaussian they lie within
@@ -61,6 +62,13 @@ class SparseFrames:
     def doubtful(self) -> bool:
         """Whether links between the last frames lack noticeably much: then more of them are wanted."""
         return self._turn() > self._config.doubtful
+
+    def reaching(self, loops: LoopConfig) -> LoopConfig:
+        """With which keyframes one is matched by depth: with more of them, and farther ones, where links lack much."""
+        if not self.doubtful:
+            return loops
+        c = self._config
+        return replace(loops, ages=c.link_ages, skip=c.link_skip, reach=c.link_reach, known=c.link_known)
 
     def missing(self) -> np.ndarray:
         """(6, 6) to be added to the covariance of every link; zero where that is not `doubtful`."""

@@ -117,12 +117,12 @@ class LoopCloser:
 
     def _near(self, keyframe: int, poses: np.ndarray) -> list[Candidate]:
         """The nearest place of each age, where the views overlap and it is known well enough how they lie."""
-        c, numbers = self._config, self._places.keyframes
+        c, numbers = self._sparse.reaching(self._config), self._places.keyframes
         if not len(numbers):
             return []
         turned, moved = self._places.distances(poses, keyframe)
         apart = np.hypot(turned / c.reach[0], moved / c.reach[1])
-        known = self._is_known(self._smoother.path_covariances(keyframe)[numbers])
+        known = _is_known(self._smoother.path_covariances(keyframe)[numbers], c.known)
         usable = (apart < 1.0) & known & (numbers <= keyframe - c.skip)
         age, candidates = keyframe - numbers, []
         for youngest, oldest in zip((0, *c.ages), (*c.ages, np.inf), strict=True):
@@ -141,12 +141,6 @@ class LoopCloser:
             return []
         found = self._places.alike(place.features, c.candidates, youngest)
         return [Candidate(one, LinkKind.ALIKE, None) for one in found]
-
-    def _is_known(self, covariances: np.ndarray) -> np.ndarray:
-        """(P,) bool, of (P, 6, 6) covariances of relative poses."""
-        variances = np.diagonal(covariances, axis1=1, axis2=2)
-        turn, move = variances[:, :3].max(axis=1), variances[:, 3:].max(axis=1)
-        return (turn < self._config.known[0] ** 2) & (move < self._config.known[1] ** 2)
 
     def _nearest_place(self, keyframe: int, poses: np.ndarray) -> int | None:
         """A place that can stand for a keyframe: near it, and it is known how they lie, whatever drifted elsewhere."""
@@ -214,6 +208,13 @@ class LoopCloser:
         covariance = known + link.motion.covariance + pose_covariance(self._config.gate_floor)
         T_estimated = inverse(poses[link.a]) @ poses[link.b]
         return chi_square(link.motion.T_a_b, T_estimated, covariance) < self._config.gate
+
+
+def _is_known(covariances: np.ndarray, known: tuple[float, float]) -> np.ndarray:
+    """(P,) bool, of (P, 6, 6) covariances of relative poses: their deviations are below `known`, rad and m."""
+    variances = np.diagonal(covariances, axis1=1, axis2=2)
+    turn, move = variances[:, :3].max(axis=1), variances[:, 3:].max(axis=1)
+    return (turn < known[0] ** 2) & (move < known[1] ** 2)
 
 
 def _widened(link: LinkFound, missing: np.ndarray) -> LinkFound:

@@ -30,6 +30,16 @@ def chosen(poses: list[np.ndarray], config: KeyframeConfig = CONFIG) -> list[int
     return [i for i, T in enumerate(poses) if selector.is_keyframe(T)]
 
 
+def test_where_every_frame_is_wanted_a_still_camera_has_keyframes_too():
+    selector = KeyframeSelector(CONFIG)
+    assert [selector.is_keyframe(pose(), every=every) for every in (False, False, True, False)] == [
+        True,
+        False,
+        True,
+        False,
+    ]
+
+
 def random_poses(seed: int, count: int) -> np.ndarray:
     rng = np.random.default_rng(seed)
     T = np.tile(np.eye(4), (count, 1, 1))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thingmap.mapper.config import SparseConfig
+from thingmap.mapper.config import LoopConfig, SparseConfig
 from thingmap.mapper.trajectory.rigid import pose_covariance, retracted
 from thingmap.mapper.trajectory.sparse_frames import SparseFrames
 
@@ -79,3 +79,20 @@ def test_only_the_latest_comparisons_count():
     assert sparse.doubtful
     compare(sparse, 0.0, 0.0, 20, seed=1)
     assert not sparse.doubtful
+
+
+def test_where_links_lack_much_depth_links_more_and_farther_keyframes():
+    config, loops = SparseConfig(), LoopConfig()
+    sparse = frames(0.7)
+    compare(sparse, 0.015, 0.02, 30)
+    reaching = sparse.reaching(loops)
+    assert reaching.reach == config.link_reach and reaching.known == config.link_known
+    assert len(reaching.ages) > len(loops.ages) and reaching.skip < loops.skip
+    assert reaching.gate == loops.gate
+
+
+def test_where_they_lack_nothing_links_stay_as_they_are():
+    video, way_points = frames(1 / 30), frames(0.7)
+    for sparse in (video, way_points):
+        compare(sparse, 0.0, 0.0, 30)
+        assert sparse.reaching(LoopConfig()) == LoopConfig()
