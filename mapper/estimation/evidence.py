@@ -29,6 +29,7 @@ EXPECTED = 0.5  # expected detection rate above which not being detected is coun
 SEEN_THROUGH = 0.7  # free ratio above which a view is counted as seeing through the volume
 NEW_VIEW = 0.3  # view weight above which a detection becomes a measurement of the graph
 FIRST_MEASUREMENTS = 4  # measurements that enter the graph whatever their view weight
+LEAST_WEIGHT = 1e-3  # of an embedding from where others came: where all are such, their mean is still theirs
 OUTCOMES = {
     Verdict.SUPPORTED: Outcome.SUPPORTED,
     Verdict.SEEN_THROUGH: Outcome.SEEN_THROUGH,
@@ -134,7 +135,15 @@ class Observer:
         landmark.measurements += 1
 
     def record_scores(self, number: int, seen: Observation) -> None:
-        """Puts the scores of a landmark's detections into the ledger."""
+        """Puts the scores of a landmark's detections into the ledger, and what they look like into its mean.
+
+        An embedding weighs as the scores beside it do: how new the view was, times the share of the template. Which
+        landmark a detection shows was decided before (`associate`): it is of that one with its whole weight.
+        """
+        looks = self._scene.landmarks[number].embedding
+        for d, share in zip(seen.detections, seen.shares, strict=True):
+            if d.embedding is not None:
+                looks.add(seen.keyframe, d.embedding, max(seen.weight, LEAST_WEIGHT) * float(share))
         for d in seen.detections:
             scores, occlusion = np.asarray(d.scores, dtype=np.float32), 1.0 - float(seen.visible[d.part])
             self._smoother.add(Scores(seen.keyframe, number, scores, occlusion, seen.weight, d.part))

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .beliefs import Belief
+from .embeddings import EmbeddingMean
 from .size_site import SizeSite
 from .view_log import ViewLog
 
@@ -27,6 +28,7 @@ class Landmark:
         measurements: number of measurements in the graph.
         size_site: what stands for its class in `log_size_covariance`.
         log: what every view said.
+        embedding: what it looks like.
     """
 
     number: int
@@ -45,6 +47,7 @@ class Landmark:
     unsettled: bool = False
     size_site: SizeSite = field(default_factory=lambda: SizeSite(np.zeros(3), 1e-3 * np.eye(3)))
     log: ViewLog = field(default_factory=ViewLog)
+    embedding: EmbeddingMean = field(default_factory=EmbeddingMean)
 
     @property
     def half_axes(self) -> np.ndarray:
@@ -55,6 +58,7 @@ class Landmark:
         """Takes over the counts of a landmark merged into this one."""
         self.belief.absorb(other.belief)
         self.log.absorb(other.log)
+        self.embedding.absorb(other.embedding)
         self.first_seen, self.last_seen = min(self.first_seen, other.first_seen), max(self.last_seen, other.last_seen)
         self.supporting |= other.supporting
         self.contradicting = (self.contradicting | other.contradicting) - self.supporting

@@ -6,7 +6,7 @@ look at. Depth is read where the half is, for there the object shows; centre and
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,6 +39,7 @@ class LiftedDetection:
         half_extents: (3,) metres, of the whole object: half width, half depth (assumed), half height.
         part: `Part` that the box shows.
         whole_xyxy: (4,) pixels, box of the whole object that this implies, not clipped; `xyxy` unless given.
+        embedding: (D,) float32 as the detector gave it, or None.
     """
 
     scores: np.ndarray
@@ -51,6 +52,7 @@ class LiftedDetection:
     half_extents: np.ndarray
     part: int = Part.WHOLE
     whole_xyxy: np.ndarray = None  # type: ignore[assignment]
+    embedding: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         if self.whole_xyxy is None:
@@ -91,7 +93,11 @@ def lift(
             refused.append(Outcome.PART_UNUSED)
         else:
             result = lift_box(boxes[i] - 0.5, detections.scores[i], frame, config, int(detections.part[i]))
-            (refused if isinstance(result, Outcome) else lifted).append(result)  # type: ignore[arg-type]
+            if isinstance(result, Outcome):
+                refused.append(result)
+            else:
+                embedding = None if detections.embedding is None else detections.embedding[i]
+                lifted.append(result if embedding is None else replace(result, embedding=embedding))
     return lifted, refused
 
 

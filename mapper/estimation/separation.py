@@ -89,7 +89,7 @@ def _part(
     measured = mix_up.keyframes[part]
     supporting = mix_up.seen_in(landmark.supporting, part)
     records = _take_out(landmark.number, supporting | measured, smoother)
-    log = landmark.log.take_out(supporting)
+    log, embedding = landmark.log.take_out(supporting), landmark.embedding.take_out(supporting)
     landmark.supporting = landmark.supporting - supporting
     landmark.measurements -= len(measured)
     landmark.belief.forget(supporting)
@@ -99,7 +99,7 @@ def _part(
     stamps = [note.stamp for note in log] or [landmark.first_seen, landmark.last_seen]
     belief = _belief(registry.new_belief(), records, scores, poses[:, :3, 3] - position)
     made = registry.add_landmark(position, log_size, landmark.covariance, belief, (min(stamps), max(stamps)))
-    made.supporting, made.log, made.measurements = supporting, log, len(measured)
+    made.supporting, made.log, made.measurements, made.embedding = supporting, log, len(measured), embedding
     for record in records:
         smoother.add(replace(record, landmark=made.number))
     return True

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..estimation.landmarks import Landmark
+from .appearance import Appearance
 from .thing import Evidence, Thing
 from .views_file import ThingViews
 
@@ -36,7 +37,13 @@ def compose_thing(landmark: Landmark, classes: tuple[str, ...]) -> Thing:
         last_seen=landmark.last_seen,
         evidence=Evidence(len(landmark.supporting), len(landmark.occluded), len(landmark.contradicting)),
         views=ThingViews(classes, tuple(landmark.log), landmark.log.left_out_by),
+        appearance=_appearance(landmark),
     )
+
+
+def _appearance(landmark: Landmark) -> Appearance | None:
+    mean = landmark.embedding.mean()
+    return None if mean is None else Appearance(mean, landmark.embedding.views)
 
 
 def compose_things(landmarks: Iterable[Landmark], classes: tuple[str, ...], min_existence: float) -> tuple[Thing, ...]:

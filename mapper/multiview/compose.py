@@ -9,7 +9,9 @@ import numpy as np
 
 from ...detectors.detections import Part
 from ..config import LiftingConfig, MultiViewConfig
+from ..estimation.embeddings import EmbeddingMean
 from ..estimation.view_log import Verdict, ViewNote
+from ..map.appearance import Appearance
 from ..map.compose import MIN_LISTED
 from ..map.thing import Evidence, Thing
 from ..map.views_file import ThingViews
@@ -75,7 +77,18 @@ class Composer:
             last_seen=self.views[columns[-1]].stamp,
             evidence=Evidence(seen, hidden, missed),
             views=ThingViews(self.classes, self._notes(track), {}),
+            appearance=self._appearance(track),
         )
+
+    def _appearance(self, track: int) -> Appearance | None:
+        """The mean of the embeddings of its views; all count alike, as Bayes' rule takes them."""
+        looks = EmbeddingMean()
+        for column in np.flatnonzero(self.assessment.seen[track]).tolist():
+            view = self.views[column]
+            if view.observations.embedding is not None:
+                looks.add(view.keyframe, view.observations.embedding[self._observation(track, column)], 1.0)
+        mean = looks.mean()
+        return None if mean is None else Appearance(mean, looks.views)
 
     def _existence(self, track: int) -> float:
         """Of a track that is dropped or background it is at most `DOUBTFUL`, and less the seldomer it was seen."""

@@ -30,6 +30,7 @@ class Observations:
         points: of each, (P, 3) float32 some of its readings, camera frame, metres; without a mask spread over the box.
         log_distribution: (N, K + 1) log p(y), the background last.
         class_id, confidence: (N,) best class and its score, as the detector gave it.
+        embedding: (N, D) float32 as the detector gave it, or None.
     """
 
     row: np.ndarray
@@ -38,6 +39,7 @@ class Observations:
     log_distribution: np.ndarray
     class_id: np.ndarray
     confidence: np.ndarray
+    embedding: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.row)
@@ -73,6 +75,7 @@ def observe(
         log_distribution=np.log(class_distribution(detections.scores[chosen], config.least_probability)),
         class_id=detections.class_id[chosen],
         confidence=detections.confidence[chosen],
+        embedding=None if detections.embedding is None else detections.embedding[chosen],
     )
     return observations, refused
 
