@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-LINES, GENERATOR = 2584, 1597  # neighbours in Fibonacci's sequence: they make an even lattice of the unit square
+from .polygon import Polygon, lattice, probability_in_polygon
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,31 +47,45 @@ class Ball:
         return np.where(hit, middle - half, np.inf), np.where(hit, middle + half, -np.inf)
 
 
-Region = Box | Ball
+Region = Box | Ball | Polygon
 
 
 def as_region(value: object) -> Region:
-    """A region from `((xmin, ymin, zmin), (xmax, ymax, zmax))`, `(centre, radius)` or a region itself.
+    """A region from `((xmin, ymin, zmin), (xmax, ymax, zmax))`, `(centre, radius)`, the (M, 2) corners of a polygon,
+    `(corners, (low, high))` with the heights between which it stands, or a region itself.
 
     Raises:
-        ValueError: where it is neither, a box is turned inside out, or a radius is negative.
+        ValueError: where it is none, a box is turned inside out, a radius is negative, or a polygon crosses itself.
     """
-    if isinstance(value, Box | Ball):
+    if isinstance(value, Box | Ball | Polygon):
         return value
-    expected = "a region is ((xmin, ymin, zmin), (xmax, ymax, zmax)) or (centre, radius)"
+    expected = "a region is ((xmin, ymin, zmin), (xmax, ymax, zmax)), (centre, radius) or the corners of a polygon"
+    corners = _numbers(value)
+    if corners is not None and corners.shape != (2, 2) and corners.ndim == 2 and corners.shape[1] == 2:
+        return Polygon(corners)
     try:
         first, second = (np.asarray(part, dtype=np.float64) for part in value)  # type: ignore[attr-defined]
     except (TypeError, ValueError):
         raise ValueError(f"{expected}, but got {value!r}") from None
     if first.shape == (3,) and second.shape == () and second >= 0.0:
         return Ball(first, float(second))
+    if first.ndim == 2 and first.shape[1] == 2 and second.shape == (2,):
+        return Polygon(first, float(second[0]), float(second[1]))
     if first.shape == (3,) and second.shape == (3,) and np.all(first <= second):
         return Box(first, second)
     raise ValueError(f"{expected} with xmin <= xmax and a radius >= 0, but got {value!r}")
 
 
+def _numbers(value: object) -> np.ndarray | None:
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+
+
 def probability_inside(region: Region, mean: np.ndarray, covariance: np.ndarray) -> float:
-    """P(x in region) for x ~ N(mean (3,), covariance (3, 3)), metres; within 0.002.
+    """P(x in region) for x ~ N(mean (3,), covariance (3, 3)), metres; within 0.002. For a polygon x is in the upright
+    frame, otherwise in the map's.
 
     Boxes and balls are convex, so a line cuts them in one interval: the integral along the widest principal axis is a
     difference of two normal distribution functions. Across it, the lines stand on a Fibonacci lattice in the unit
@@ -79,11 +93,11 @@ def probability_inside(region: Region, mean: np.ndarray, covariance: np.ndarray)
     """
     from scipy.special import ndtr, ndtri
 
+    if isinstance(region, Polygon):
+        return probability_in_polygon(region, mean, covariance)
     variances, axes = np.linalg.eigh(covariance)
     stds = np.sqrt(np.maximum(variances, 0.0))
-    number = np.arange(LINES)
-    lattice = np.stack([number + 0.5, number * GENERATOR % LINES + 0.5], axis=1) / LINES
-    across = ndtri(lattice) * stds[:2]
+    across = ndtri(lattice()) * stds[:2]
     enter, leave = region.chord(mean + across @ axes[:, :2].T, axes[:, 2])
     if stds[2] == 0.0:
         return float(np.mean((enter <= 0.0) & (leave >= 0.0)))

@@ -15,9 +15,11 @@ class Answer:
 
     Attributes:
         thing: with its covariance and its whole class posterior.
-        probability: P(the thing is what was asked for); with a region, also that its centre is in there.
-        distance: metres from the point asked about to the thing's centre, None where no point was.
-        distance_std: standard deviation of `distance`, metres, from the position's covariance.
+        probability: P(the thing is what was asked for); with a region, also that its centre is in there; with a
+            relation, also that it holds.
+        distance: metres from the point asked about to the thing's centre; of `next_to`, the horizontal gap between the
+            boxes; None for other questions.
+        distance_std: standard deviation of `distance`, metres, from what is not known of positions (and sizes).
     """
 
     thing: Thing

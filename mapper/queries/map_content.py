@@ -13,6 +13,7 @@ from ..map.thing import Thing
 if TYPE_CHECKING:
     from ...datasets.frame import Intrinsics
     from ..map.up_direction import UpDirection
+    from .index import ThingIndex
 
 
 class MapContent:
@@ -30,6 +31,11 @@ class MapContent:
     @property
     def R_world_upright(self) -> np.ndarray:
         """(3, 3) axes of the upright frame in which boxes are measured; argument of `Thing.corners`."""
+        raise NotImplementedError
+
+    @property
+    def index(self) -> ThingIndex:
+        """Finds things quickly."""
         raise NotImplementedError
 
     def thing(self, which: Thing | str) -> Thing:

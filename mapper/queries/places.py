@@ -6,13 +6,13 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..map.region import as_region, probability_inside
+from ..map.region import Polygon, as_region, probability_inside
 from ..map.thing import Thing
 from .answer import PROBABLE, Answer
-from .map_content import MapContent
+from .names import NameQuestions
 
 
-class PlaceQuestions(MapContent):
+class PlaceQuestions(NameQuestions):
     """Questions about places."""
 
     __slots__ = ()
@@ -28,38 +28,49 @@ class PlaceQuestions(MapContent):
 
         Args:
             point: where to measure from.
-            label: only things that are one with at least `min_probability`; None for things of any class, by existence.
+            label: only things that are one with at least `min_probability`, in words as for `find`; None for things of
+                any class, by existence.
             count: how many; None for all.
             min_probability: of being what was asked for.
         """
         origin = np.asarray(point, dtype=np.float64)
         if origin.shape != (3,) or not np.all(np.isfinite(origin)):
             raise ValueError(f"point must be three finite numbers, but got {point!r}")
-        answers = [
-            Answer(thing, probability, *_distance(origin, thing))
-            for thing, probability in self._asked_for(label, min_probability)
-        ]
+        near = self.index.near(origin, self._labels(label), count, min_probability)
+        answers = [Answer(thing, probability, *_distance(origin, thing)) for thing, probability in near]
         return sorted(answers, key=lambda answer: (answer.distance, answer.thing.id))[:count]
 
     def within(self, region: object, label: str | None = None, min_probability: float = PROBABLE) -> list[Answer]:
         """Things whose centre is in a region with at least `min_probability`, likeliest first.
 
         Args:
-            region: `((xmin, ymin, zmin), (xmax, ymax, zmax))` or `(centre, radius)`, metres, map frame.
+            region: `((xmin, ymin, zmin), (xmax, ymax, zmax))` or `(centre, radius)`, metres, map frame; or the (M, 2)
+                corners of a polygon of the floor plan, x and y along the first two axes of the upright frame
+                (`R_world_upright`), metres, M >= 3; with the heights between which it stands `(corners, (low, high))`,
+                metres along up. A polygon may have dents.
             label: as for `nearest`.
             min_probability: of existing, being a `label` and having its centre inside, all three.
         """
         where = as_region(region)
-        answers = [
-            Answer(thing, probability * probability_inside(where, thing.position, thing.position_covariance))
-            for thing, probability in self._asked_for(label, min_probability)
-        ]
-        answers = [answer for answer in answers if answer.probability >= min_probability and answer.probability > 0.0]
+        if isinstance(where, Polygon):
+            inside = self._inside(where, label, min_probability)
+        else:
+            inside = self.index.within(where, self._labels(label), min_probability)
+        answers = [Answer(thing, probability) for thing, probability in inside]
         return sorted(answers, key=lambda answer: (-answer.probability, answer.thing.id))
 
-    def _asked_for(self, label: str | None, min_probability: float) -> list[tuple[Thing, float]]:
-        asked = [(thing, thing.existence if label is None else thing.belief(label)) for thing in self.things]
-        return [(thing, p) for thing, p in asked if p >= min_probability and p > 0.0]
+    def _labels(self, text: str | None) -> tuple[str, ...] | None:
+        """What the index is asked for; None for things of any class."""
+        return None if text is None else self.understand(text).labels
+
+    def _inside(self, region: Polygon, label: str | None, min_probability: float) -> list[tuple[Thing, float]]:
+        R = self.R_world_upright
+        found = []
+        for thing, probability in self.index.probable(self._labels(label), min_probability):
+            p = probability * probability_inside(region, R.T @ thing.position, R.T @ thing.position_covariance @ R)
+            if p >= min_probability and p > 0.0:
+                found.append((thing, p))
+        return found
 
 
 def _distance(origin: np.ndarray, thing: Thing) -> tuple[float, float]:

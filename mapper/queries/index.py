@@ -1,0 +1,240 @@
+"""Finds things among many: by id, by given name, by label, by place.
+
+What the index gives is the same as going through all things would give. It holds arrays, sorted by one coordinate, and
+KD-trees over what is probable enough; each is made when it is first needed and kept. SQLite's R*Tree names the things
+in a box quicker than the sorted array does, but both take some hundredths of a millisecond of 100,000 things, after
+which probabilities take a tenth; filling the R*Tree takes many times as long, and it cannot tell what is nearest
+(`benchmarks/map_index.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+
+import numpy as np
+
+from ..map.region import Ball, Box, probability_inside
+from ..map.thing import Thing
+from .answer import Answer
+from .index_group import Asked
+from .inside_bounds import inside_bounds
+
+Labels = str | Sequence[str] | None  # one, several of which any will do, or things of any class
+KEPT_LABELS = 256  # questions for labels whose answers are kept
+KEPT_GROUPS = 32  # groups of things with their trees; one of 100,000 takes 10 MB
+AGREE = 1e-4  # bounds that are this close are an answer: integrals are within 0.002
+INTEGRAL_ERROR = 0.004  # twice what `probability_inside` is within
+FARTHEST = 40.0  # standard deviations beyond which a normal probability is 0 in double precision
+
+
+class ThingIndex:
+    """An index of things, which do not change.
+
+    Args:
+        things: of a map.
+    """
+
+    def __init__(self, things: Sequence[Thing]) -> None:
+        self._things = tuple(things)
+        self._ranked: dict[tuple[str, ...], tuple[Answer, ...]] = {}
+        self._groups: dict[tuple[tuple[str, ...] | None, float], Asked] = {}
+
+    def thing(self, thing_id: str) -> Thing | None:
+        """The thing that has an id, None where there is none."""
+        row = self._row_of_id.get(thing_id)
+        return None if row is None else self._things[row]
+
+    def named(self, name: str) -> tuple[Thing, ...]:
+        """Things that somebody gave this name; upper and lower case are the same, and so are runs of spaces."""
+        return tuple(self._things[row] for row in self._rows_by_name.get(_plain(name), ()))
+
+    def names(self) -> tuple[str, ...]:
+        """Every name that was given, as it was given."""
+        return tuple(thing.name for thing in self._things if thing.name)
+
+    def ranked(self, labels: Sequence[str], min_probability: float = 0.0) -> list[Answer]:
+        """Things that may be one of the labels, likeliest first, equally likely ones by id; as `ObjectMap.find`.
+
+        The probability is the sum of those of the labels, and at most that of existing. What cannot be one is left out.
+        """
+        key = _key(labels) or ()
+        if key not in self._ranked:
+            if len(self._ranked) >= KEPT_LABELS:
+                del self._ranked[next(iter(self._ranked))]
+            self._ranked[key] = self._rank(key)
+        answers = self._ranked[key]
+        if not min_probability > 0.0 or not answers or answers[-1].probability >= min_probability:
+            return list(answers)
+        from bisect import bisect_right
+
+        return list(answers[: bisect_right(answers, -min_probability, key=lambda answer: -answer.probability)])
+
+    def _rank(self, labels: tuple[str, ...]) -> tuple[Answer, ...]:
+        rows, beliefs = self._beliefs(labels)
+        known = zip(rows.tolist(), beliefs.tolist(), strict=True)
+        answers = (Answer(self._things[row], p) for row, p in known if p > 0.0)
+        return tuple(sorted(answers, key=lambda answer: (-answer.probability, answer.thing.id)))
+
+    def probable(self, label: Labels, min_probability: float) -> list[tuple[Thing, float]]:
+        """All things that are what was asked for, with that probability; arguments as for `near`."""
+        asked = self._asked(label, min_probability)
+        return self._with_probability(asked, np.arange(len(asked.rows)))
+
+    def near(
+        self, origin: np.ndarray, label: Labels, count: int | None, min_probability: float
+    ) -> list[tuple[Thing, float]]:
+        """All things that are as near to (3,) `origin`, metres, as the `count`-th nearest, with their probability.
+
+        Args:
+            origin: map frame.
+            label: things that are one, or one of several, with at least `min_probability`; None for those that exist
+                with it.
+            count: how many, more where several are equally far; None for all.
+            min_probability: of being what was asked for; what cannot be that is left out whatever it is.
+
+        Returns:
+            Unsorted things with P(it is what was asked for).
+        """
+        asked = self._asked(label, min_probability)
+        return self._with_probability(asked, asked.near(origin, count))
+
+    def within(self, region: Box | Ball, label: Labels, min_probability: float) -> list[tuple[Thing, float]]:
+        """All things that are what was asked for and have their centre in a region, with at least `min_probability`.
+
+        Args:
+            region: map frame.
+            label, min_probability: as for `near`, but of being inside too.
+
+        Returns:
+            Unsorted things with P(it is what was asked for and its centre is inside).
+        """
+        asked = self._asked(label, min_probability)
+        places = self._places_within(region, asked, min_probability)
+        if len(places) == 0:
+            return []
+        probability, positions = asked.probability[places], asked.positions[places]
+        covariances = self._covariances(asked.rows[places])
+        lower, upper = inside_bounds(region, positions, covariances)
+        answers = []
+        possible = (probability * upper >= min_probability - INTEGRAL_ERROR) & (upper > 0.0)
+        for k in np.flatnonzero(possible).tolist():
+            inside = float(lower[k] + upper[k]) / 2.0
+            if upper[k] - lower[k] > AGREE:
+                inside = probability_inside(region, positions[k], covariances[k])
+            p = float(probability[k]) * inside
+            if p >= min_probability and p > 0.0:
+                answers.append((self._things[int(asked.rows[places[k]])], p))
+        return answers
+
+    def _places_within(self, region: Box | Ball, asked: Asked, min_probability: float) -> np.ndarray:
+        """Places in `asked.rows` of all that may be inside with at least `min_probability`.
+
+        Both regions are convex: with its mean at a distance d outside a face, a point is inside with Φ(-d / σ) at most.
+        """
+        from scipy.special import ndtri
+
+        least = min_probability - INTEGRAL_ERROR
+        sigmas = 0.0 if least >= 0.5 else FARTHEST if least <= 0.0 else min(float(-ndtri(least)), FARTHEST)
+        low, high = _extent(region)
+        widest = sigmas * self._widest
+        places = asked.by_x[slice(*np.searchsorted(asked.x, (low[0] - widest - 1e-9, high[0] + widest + 1e-9)))]
+        for axis in (1, 2, 0) if sigmas else (1, 2):
+            margin = 1e-9 + (sigmas * self._stds[asked.rows[places], axis] if sigmas else 0.0)
+            value = asked.positions[places, axis]
+            places = places[(value >= low[axis] - margin) & (value <= high[axis] + margin)]
+        return places
+
+    def _asked(self, label: Labels, min_probability: float) -> Asked:
+        labels = _key(label)
+        key = labels, float(min_probability)
+        asked = self._groups.pop(key, None)
+        if asked is None:
+            rows, beliefs = self._beliefs(labels)
+            enough = (beliefs >= min_probability) & (beliefs > 0.0)
+            rows = rows[enough]
+            positions = self._positions[rows]
+            by_x = np.argsort(positions[:, 0], kind="stable")
+            asked = Asked(rows, beliefs[enough], positions, by_x, positions[by_x, 0])
+        self._groups[key] = asked  # at the end: the first one is the one that was not asked for longest
+        if len(self._groups) > KEPT_GROUPS:
+            del self._groups[next(iter(self._groups))]
+        return asked
+
+    def _with_probability(self, asked: Asked, places: np.ndarray) -> list[tuple[Thing, float]]:
+        rows, probability = asked.rows[places].tolist(), asked.probability[places].tolist()
+        return [(self._things[row], p) for row, p in zip(rows, probability, strict=True)]
+
+    def _beliefs(self, labels: tuple[str, ...] | None) -> tuple[np.ndarray, np.ndarray]:
+        """(M,) places of things that may be one of the labels, and the probability of each; of all, that they exist."""
+        if labels is None:
+            return np.arange(len(self._things)), self._existence
+        rows = sorted({row for label in labels for row in self._rows_by_label.get(label, ())})
+        things = (self._things[row] for row in rows)
+        beliefs = [min(sum(map(thing.belief, labels)), thing.existence) for thing in things]
+        return np.array(rows, dtype=np.int64), np.array(beliefs, dtype=np.float64)
+
+    def _covariances(self, rows: np.ndarray) -> np.ndarray:
+        return np.array([self._things[row].position_covariance for row in rows.tolist()]).reshape(-1, 3, 3)
+
+    @cached_property
+    def _row_of_id(self) -> dict[str, int]:
+        return {thing.id: row for row, thing in enumerate(self._things)}
+
+    @cached_property
+    def _rows_by_name(self) -> dict[str, list[int]]:
+        return _rows_by((row, _plain(thing.name)) for row, thing in enumerate(self._things) if thing.name)
+
+    @cached_property
+    def _rows_by_label(self) -> dict[str, list[int]]:
+        lower: dict[str, str] = {}
+        found: dict[str, list[int]] = {}
+        for row, thing in enumerate(self._things):
+            for name in thing.class_posterior:
+                key = lower.get(name) or lower.setdefault(name, name.casefold())
+                rows = found.setdefault(key, [])
+                if not rows or rows[-1] != row:  # "Cup" and "cup" are one label
+                    rows.append(row)
+        return found
+
+    @cached_property
+    def _existence(self) -> np.ndarray:
+        return np.array([thing.existence for thing in self._things])
+
+    @cached_property
+    def _positions(self) -> np.ndarray:
+        return np.array([thing.position for thing in self._things]).reshape(-1, 3)
+
+    @cached_property
+    def _stds(self) -> np.ndarray:
+        """(N, 3) metres along the map's axes."""
+        return np.sqrt(np.maximum(np.einsum("nii->ni", self._covariances(np.arange(len(self._things)))), 0.0))
+
+    @cached_property
+    def _widest(self) -> float:
+        return float(self._stds.max(initial=0.0))
+
+
+def _extent(region: Box | Ball) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest corner of the axis-aligned box about a region."""
+    if isinstance(region, Box):
+        return region.low, region.high
+    return region.centre - region.radius, region.centre + region.radius
+
+
+def _key(label: Labels) -> tuple[str, ...] | None:
+    """Labels in small letters, each once; None for things of any class."""
+    if label is None:
+        return None
+    return tuple(dict.fromkeys(one.casefold() for one in ([label] if isinstance(label, str) else label)))
+
+
+def _plain(name: str) -> str:
+    return " ".join(name.casefold().split())
+
+
+def _rows_by(pairs: Iterable[tuple[int, str]]) -> dict[str, list[int]]:
+    found: dict[str, list[int]] = {}
+    for row, key in pairs:
+        found.setdefault(key, []).append(row)
+    return found
