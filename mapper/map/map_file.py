@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ...datasets.errors import InputError
+from ...datasets.errors import InputError, UserError
 from ...datasets.frame import Intrinsics
 from ...datasets.json_record import JsonRecord
+from ..edits.stored import applied_from, applied_to_dict, thing_edits_from, thing_edits_to_dict
+from .appearance import EmbeddingFile, StoredAppearance, embeddings_path, write_embeddings
 from .atomic import make_folder, write_atomic
 from .labelled_cloud import LabelledCloud
 from .object_map import MapFrame, ObjectMap
@@ -31,27 +33,45 @@ NEGLIGIBLE = 1e-4  # class probability that is not written
 def write_map(object_map: ObjectMap, path: Path, include_doubtful: bool = False, evidence: bool = True) -> Path:
     """Write the map to a `.json` file, or as `map.json` into a folder, made where absent; returns the file's path.
 
-    With `evidence`, what is known of its things' views goes beside it first, so that no map names what is not there.
+    With `evidence`, what is known of its things' views and looks goes beside it first, so that no map names what is
+    not there.
+
+    Raises:
+        UserError: the place cannot be written, or the map has edits in it that the journal there holds too.
     """
     folder = path.is_dir() or path.suffix != ".json"
     file = path / FILE_NAME if folder else path
     make_folder(file.parent)
+    if object_map.edits.changed and (journal := _journal_path(file)).exists():
+        raise UserError(
+            f"{file}: an edited map would pass for what was estimated, and {journal.name} would change it again; save "
+            "it elsewhere, or load it with edits=False"
+        )
     document = to_document(object_map, include_doubtful)
     if evidence:
-        beside = evidence_path(file)
-        sha256 = write_views(beside, _written(object_map, include_doubtful))
-        if sha256 is not None:
-            things = document.pop("things")
-            document |= {"evidence": {"file": beside.name, "sha256": sha256}, "things": things}
+        written, things = _written(object_map, include_doubtful), document.pop("things")
+        for name, beside, write in (
+            ("evidence", evidence_path(file), write_views),
+            ("embeddings", embeddings_path(file), write_embeddings),
+        ):
+            sha256 = write(beside, written)
+            if sha256 is not None:
+                document[name] = {"file": beside.name, "sha256": sha256}
+        document["things"] = things
     write_atomic(file, format_document(document).encode())
     return file
 
 
-def read_map(path: Path) -> ObjectMap:
+def read_map(path: Path, edits: bool = True) -> ObjectMap:
     """Read a map from its file or from the folder that holds `map.json`.
 
+    Args:
+        path: where from.
+        edits: do what the journal beside it says; else the map is as it was estimated.
+
     Raises:
-        InputError: there is no such file, it is not JSON, or it is not a "thingmap/1" document.
+        InputError: there is no such file, it is not JSON, or it is not a "thingmap/1" document; or its journal is
+            damaged.
     """
     file = path / FILE_NAME if path.is_dir() else path
     try:
@@ -65,7 +85,21 @@ def read_map(path: Path) -> ObjectMap:
     except json.JSONDecodeError as error:
         where = f"broken JSON at line {error.lineno} ({error.msg})"
         raise InputError(file, "a map in JSON", where, "write the map again with `thingmap run`") from None
-    return from_document(document, file)
+    object_map = from_document(document, file)
+    return _with_edits(object_map, file) if edits and _journal_path(file).exists() else object_map
+
+
+def _journal_path(file: Path) -> Path:
+    from ..edits.journal import journal_path
+
+    return journal_path(file)
+
+
+def _with_edits(object_map: ObjectMap, file: Path) -> ObjectMap:
+    from ..edits.apply import apply_edits
+    from ..edits.journal import Journal
+
+    return apply_edits(object_map, Journal(_journal_path(file)).read())
 
 
 def to_document(object_map: ObjectMap, include_doubtful: bool = False) -> dict[str, Any]:
@@ -89,6 +123,7 @@ def to_document(object_map: ObjectMap, include_doubtful: bool = False) -> dict[s
         **camera,
         "classes": list(object_map.classes),
         **labelled,
+        **applied_to_dict(object_map.edits),
         "things": [thing_to_dict(thing) for thing in _written(object_map, include_doubtful)],
     }
 
@@ -104,10 +139,10 @@ def from_document(document: Any, file: Path) -> ObjectMap:
         remedy = "open it with the version of thingmap that wrote it"
         raise InputError(file, f'the schema "{SCHEMA}"', repr(root.text("schema")), remedy)
     up = root.record("up")
-    evidence = _evidence_of(root, file)
+    evidence, embeddings = _evidence_of(root, file), _embeddings_of(root, file)
     with root.explaining():
         return ObjectMap(
-            things=tuple(_thing_from(record, evidence) for record in root.records("things")),
+            things=tuple(_thing_from(record, evidence, embeddings) for record in root.records("things")),
             classes=root.texts("classes"),
             source=root.text("source"),
             frame=MapFrame(root.choice("frame", tuple(MapFrame))),
@@ -115,6 +150,7 @@ def from_document(document: Any, file: Path) -> ObjectMap:
             labels=_labels_of(root, file),
             camera=_camera_from(root.record("camera")) if "camera" in root else None,
             cloud=_cloud_beside(file),
+            edits=applied_from(root),
         )
 
 
@@ -153,6 +189,7 @@ def thing_to_dict(thing: Thing) -> dict[str, Any]:
         "last_seen": thing.last_seen,
         "evidence": asdict(thing.evidence),
         **_points_to_dict(thing),
+        **thing_edits_to_dict(thing),
     }
 
 
@@ -173,6 +210,15 @@ def _evidence_of(root: JsonRecord, file: Path) -> EvidenceFile:
         return EvidenceFile(file.with_name(named.name("file")), named.name("sha256"), file)
 
 
+def _embeddings_of(root: JsonRecord, file: Path) -> EmbeddingFile | None:
+    """The file of embeddings that the map names, None where it names none."""
+    if "embeddings" not in root:
+        return None
+    named = root.record("embeddings")
+    with named.explaining():  # as for the evidence
+        return EmbeddingFile(file.with_name(named.name("file")), named.name("sha256"), file)
+
+
 def _labels_of(root: JsonRecord, file: Path) -> LabelledCloud | None:
     if "labels" not in root:
         return None
@@ -185,7 +231,7 @@ def _labels_of(root: JsonRecord, file: Path) -> LabelledCloud | None:
         )
 
 
-def _thing_from(record: JsonRecord, views: EvidenceFile) -> Thing:
+def _thing_from(record: JsonRecord, views: EvidenceFile, embeddings: EmbeddingFile | None) -> Thing:
     evidence = record.record("evidence")
     with record.explaining():
         return Thing(
@@ -205,6 +251,8 @@ def _thing_from(record: JsonRecord, views: EvidenceFile) -> Thing:
             views=StoredViews(views, record.text("id")),
             points=record.count("points") if "points" in record else None,
             **{name: record.array(name, (3,)) for name in ("points_size", "points_size_std") if name in record},
+            appearance=None if embeddings is None else StoredAppearance(embeddings, record.text("id")),
+            **thing_edits_from(record),
         )
 
 

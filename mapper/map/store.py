@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from ...datasets.errors import InputError, UserError
+from ..edits.journal import journal_path
+from .appearance import embeddings_path
 from .atomic import make_folder, replacing, write_atomic
 from .cloud_file import AGAIN, read_cloud, write_cloud, write_labels
 from .map_file import CLOUD_NAME
@@ -68,6 +70,16 @@ class OutputFolder:
         return evidence_path(self.map_file)
 
     @property
+    def embeddings_file(self) -> Path:
+        """How things look, where the detector gave embeddings; `Thing.embedding` reads it."""
+        return embeddings_path(self.map_file)
+
+    @property
+    def journal_file(self) -> Path:
+        """What people changed in the map; `MapEditor` writes it, `ObjectMap.load` does it."""
+        return journal_path(self.map_file)
+
+    @property
     def trajectory_file(self) -> Path:
         """TUM format, a line for every frame that was mapped."""
         return self.path / "trajectory.txt"
@@ -113,7 +125,15 @@ class OutputFolder:
         return self.path / "snapshots"
 
     def write_map(self, object_map: ObjectMap, include_doubtful: bool = False) -> None:
-        """The map and the evidence of its things."""
+        """The map as it was estimated and the evidence of its things.
+
+        Where people have edited the map that was here before, the journal stays, and things keep the ids that they
+        had: see `edits/remapping.py`.
+        """
+        if self.journal_file.exists():
+            from ..edits.remapping import with_kept_ids
+
+            object_map = with_kept_ids(object_map, self.map_file, include_doubtful)
         object_map.save(self.map_file, include_doubtful)
 
     def write_trajectory(self, stamps: np.ndarray, T_world_camera: np.ndarray) -> None:
@@ -160,9 +180,9 @@ class OutputFolder:
         text = json.dumps(_plain(report), indent=1, ensure_ascii=False, allow_nan=False, default=str)
         write_atomic(self.report_file, f"{text}\n".encode())
 
-    def read_map(self) -> ObjectMap:
-        """The map; raises `InputError` as `ObjectMap.load`."""
-        return ObjectMap.load(self.map_file)
+    def read_map(self, *, edits: bool = True) -> ObjectMap:
+        """The map, with people's edits or as it was estimated; raises `InputError` as `ObjectMap.load`."""
+        return ObjectMap.load(self.map_file, edits=edits)
 
     def read_trajectory(self) -> tuple[np.ndarray, np.ndarray]:
         """(N,) stamps in seconds and (N, 4, 4) `T_world_camera`."""

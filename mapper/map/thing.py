@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,11 @@ from ...datasets.errors import UserError
 from .boxes import box_corners
 from .explanation import Explanation, explain_views
 from .views_file import StoredViews, ThingViews
+
+if TYPE_CHECKING:
+    from ..edits.edit import Edit
+    from ..edits.merged_views import MergedViews
+    from .appearance import SomeAppearance
 
 POSTERIOR_TOLERANCE = 1e-4  # how far `probability` and `class_posterior[label]` may differ through rounding
 
@@ -56,6 +62,10 @@ class Thing:
         points_size: (3,) full extents along the box's own axes, metres, that its points suggest where they disagree
             with `size`; None where they agree, or nobody knows.
         points_size_std: (3,) standard deviations of `points_size`, metres; None with it.
+        name: that somebody gave this one; None without.
+        edits: what people changed of it, the oldest first; the other values are what came of them.
+        appearance: how it looks, in memory or in the map's file of embeddings; None where nobody knows. See
+            `embedding`.
 
     Raises:
         ValueError: where a shape or a value is not as above; it says which and what was found.
@@ -74,10 +84,13 @@ class Thing:
     first_seen: float
     last_seen: float
     evidence: Evidence
-    views: ThingViews | StoredViews | None = field(default=None, repr=False)
+    views: ThingViews | StoredViews | MergedViews | None = field(default=None, repr=False)
     points: int | None = None
     points_size: np.ndarray | None = None
     points_size_std: np.ndarray | None = None
+    name: str | None = None
+    edits: tuple[Edit, ...] = ()
+    appearance: SomeAppearance | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         for name, shape in (("position", (3,)), ("position_covariance", (3, 3)), ("size", (3,)), ("size_std", (3,))):
@@ -105,15 +118,10 @@ class Thing:
         kept = self.class_posterior.get(self.label)
         if kept is None or abs(kept - self.probability) > POSTERIOR_TOLERANCE:
             raise ValueError(f"probability {self.probability} must be class_posterior[{self.label!r}], which is {kept}")
-        if np.any(self.size < 0.0) or np.any(self.size_std < 0.0):
+        if min(self.size.tolist()) < 0.0 or min(self.size_std.tolist()) < 0.0:
             raise ValueError(f"size and size_std must not be negative, but got {self.size} and {self.size_std}")
         self._check_points()
-        covariance = self.position_covariance
-        scale = max(float(np.max(np.abs(covariance))), 1e-300)
-        if not np.allclose(covariance, covariance.T, rtol=0.0, atol=1e-6 * scale):
-            raise ValueError(f"position_covariance must be symmetric, but got {covariance.tolist()}")
-        if np.linalg.eigvalsh(covariance)[0] < -1e-6 * scale:
-            raise ValueError(f"position_covariance must have no negative eigenvalue, but got {covariance.tolist()}")
+        _check_covariance("position_covariance", self.position_covariance)
 
     def _check_points(self) -> None:
         size, std = self.points_size, self.points_size_std
@@ -128,6 +136,16 @@ class Thing:
     def position_std(self) -> np.ndarray:
         """(3,) standard deviations of `position` along the map's axes, metres."""
         return np.sqrt(np.maximum(np.diag(self.position_covariance), 0.0))
+
+    @property
+    def embedding(self) -> np.ndarray | None:
+        """(D,) float32 of length 1, read-only: mean of the detector's embeddings of it; None where there were none.
+
+        Raises:
+            InputError: the map's file of embeddings is missing, damaged or of another map.
+        """
+        known = None if self.appearance is None else self.appearance.read()
+        return None if known is None else known.embedding
 
     def belief(self, label: str) -> float:
         """P(it exists and is a `label`); upper and lower case are the same, 0 for a class it never was."""
@@ -159,7 +177,7 @@ def _read_only(name: str, value: np.ndarray, shape: tuple[int, ...]) -> np.ndarr
     array = np.array(value, dtype=np.float64)
     if array.shape != shape:
         raise ValueError(f"{name} must have shape {shape}, but got {array.shape}")
-    if not np.all(np.isfinite(array)):
+    if not np.isfinite(array).all():
         raise ValueError(f"{name} must be finite, but got {array.tolist()}")
     array.setflags(write=False)
     return array
@@ -170,3 +188,22 @@ def _finite(name: str, value: float) -> float:
     if not np.isfinite(number):
         raise ValueError(f"{name} must be finite, but got {number}")
     return number
+
+
+def _check_covariance(name: str, covariance: np.ndarray) -> None:
+    """Raise `ValueError` where (3, 3) is not symmetric or has a negative eigenvalue, up to rounding.
+
+    Most are found right by Sylvester's criterion on plain numbers: maps have 100,000 things, and NumPy's overhead for a
+    matrix of nine numbers is longer than all else that is done to read a thing.
+    """
+    (a, b, c), (d, e, f), (g, h, i) = covariance.tolist()
+    scale = max(map(abs, (a, b, c, d, e, f, g, h, i)))
+    slack = 1e-6 * scale
+    if max(abs(b - d), abs(c - g), abs(f - h)) > slack:
+        raise ValueError(f"{name} must be symmetric, but got {covariance.tolist()}")
+    a, e, i = a + slack, e + slack, i + slack
+    plane = a * e - b * d
+    if a > 0.0 and plane > 0.0 and a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0.0:
+        return
+    if np.linalg.eigvalsh(covariance)[0] < -slack:  # on the edge, or no covariance
+        raise ValueError(f"{name} must have no negative eigenvalue, but got {covariance.tolist()}")

@@ -45,7 +45,7 @@ def load_run(out: str | Path) -> MappedRun:
         InputError: the folder holds no map, or one of its files is not what it should be.
     """
     folder = OutputFolder.open(out)
-    object_map = folder.read_map()
+    object_map = folder.read_map(edits=False)  # what was estimated is judged, not what somebody corrected
     trajectory = read_tum_poses(folder.trajectory_file)
     if len(trajectory.stamps) == 0:
         raise InputError(folder.trajectory_file, "the pose of a frame", "none", AGAIN)
