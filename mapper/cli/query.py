@@ -1,8 +1,7 @@
-"""`thingmap query`: where is it, how far, and how sure is that."""
+"""`thingmap query`: where is it, how far, and how sure is that; what is on, in, under and next to what."""
 
 from __future__ import annotations
 
-import difflib
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,18 +9,54 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from ..map.explanation import Explanation
     from ..map.object_map import ObjectMap
     from ..queries.answer import Answer
+    from .query_questions import Question
 
-LISTED = 30  # labels named in a message
+WHAT = "THING|LABEL"
+Corners = tuple[float, float, float, float, float, float]
+Centre = tuple[float, float, float, float]
 
 
 def query(
     folder: Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `thingmap run` wrote, or a map.json.")],
-    label: Annotated[str, typer.Argument(metavar="LABEL", help="What to look for.")],
+    label: Annotated[
+        str | None,
+        typer.Argument(metavar="[LABEL]", help='What to look for, or a question: "what is on the table?".'),
+    ] = None,
     near: Annotated[
         tuple[float, float, float] | None,
         typer.Option(metavar="X Y Z", help="Sort by distance from this point, metres in the map's frame."),
+    ] = None,
+    on: Annotated[str | None, typer.Option(metavar=WHAT, help="What rests on it.")] = None,
+    supports_of: Annotated[str | None, typer.Option(metavar=WHAT, help="What it rests on.")] = None,
+    inside: Annotated[str | None, typer.Option(metavar=WHAT, help="What is in it.")] = None,
+    under: Annotated[str | None, typer.Option(metavar=WHAT, help="What is below it.")] = None,
+    next_to: Annotated[str | None, typer.Option(metavar=WHAT, help="What is side by side with it.")] = None,
+    within_box: Annotated[
+        Corners | None, typer.Option(metavar="X Y Z X Y Z", help="What is between two corners, metres, map's frame.")
+    ] = None,
+    within_ball: Annotated[
+        Centre | None, typer.Option(metavar="X Y Z R", help="What is within R metres of a point.")
+    ] = None,
+    within_polygon: Annotated[
+        str | None,
+        typer.Option(metavar='"X,Y X,Y X,Y"', help="What is over a polygon of the floor plan, metres, upright frame."),
+    ] = None,
+    heights: Annotated[
+        tuple[float, float] | None, typer.Option(metavar="LOW HIGH", help="Of the polygon, metres along up.")
+    ] = None,
+    last_seen: Annotated[str | None, typer.Option(metavar=WHAT, help="When it was seen last, and from where.")] = None,
+    visible_from: Annotated[
+        str | None,
+        typer.Option(metavar="POSE", help='What is seen from "tx ty tz qx qy qz qw", or a stamp of the trajectory.'),
+    ] = None,
+    expected_at: Annotated[
+        str | None, typer.Option(metavar="POSE", help="What the detector should find from there.")
+    ] = None,
+    where_to_look: Annotated[
+        str | None, typer.Option(metavar=WHAT, help="From where a look would tell most about it.")
     ] = None,
     min_probability: Annotated[
         float, typer.Option(min=0.0, max=1.0, metavar="P", help="Leave out what is less probably a LABEL.")
@@ -31,46 +66,74 @@ def query(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Answer in JSON, with --why every view on record.")] = False,
 ) -> None:
-    """Find the things that may be a LABEL.
+    """Find the things that may be a LABEL, or answer a question about places.
 
-    The likeliest or, with --near, the nearest come first, each with its probability and uncertainty.
+    The likeliest or, with --near, the nearest come first, each with its probability and uncertainty. One question at a
+    time; a LABEL with it leaves only answers that may be one.
     """
     from ...datasets.errors import UserError
     from ..map.object_map import ObjectMap
+    from .query_places import ball_of, box_of, polygon_of
+    from .query_questions import ask, question_of, remark
+    from .query_sentence import Kind
+
+    if heights is not None and within_polygon is None:
+        raise UserError("--heights goes with --within-polygon")
+    regions = [
+        None if within_box is None else box_of(within_box),
+        None if within_ball is None else ball_of(within_ball),
+        None if within_polygon is None else polygon_of(within_polygon, heights),
+    ]
+    chosen = [region for region in regions if region is not None]
+    if len(chosen) > 1:
+        raise UserError("--within-box, --within-ball and --within-polygon are different questions; ask one at a time")
+    options = {
+        **{Kind.ON: on, Kind.SUPPORTS: supports_of, Kind.INSIDE: inside, Kind.UNDER: under, Kind.NEXT_TO: next_to},
+        **{Kind.WITHIN: chosen[0] if chosen else None, Kind.LAST_SEEN: last_seen, Kind.VISIBLE: visible_from},
+        **{Kind.EXPECTED: expected_at, Kind.LOOK: where_to_look},
+    }
+    asked = {kind: value for kind, value in options.items() if value is not None}
+    object_map = ObjectMap.load(folder)
+    question = question_of(label, asked, near, min_probability, object_map)
+    note = remark(question, object_map)
+    answers = ask(question, object_map, folder)
+    if note is not None:
+        typer.echo(note, err=True)
+    _show(question, answers, object_map, why, as_json)
+
+
+def _show(question: Question, answers: list[Any], object_map: ObjectMap, why: bool, as_json: bool) -> None:
+    from ...datasets.errors import UserError
+    from . import query_answers as shown
+    from .query_questions import nothing_found
+    from .query_sentence import Kind
     from .tables import print_answers, print_explained
 
-    object_map = ObjectMap.load(folder)
-    if not object_map.knows(label):
-        raise UserError(_unknown(label, object_map))
-    if near is None:
-        answers = object_map.find(label, min_probability)
-    else:
-        answers = object_map.nearest(near, label, min_probability=min_probability)
-    explained = [(answer, answer.thing.explain(label)) for answer in answers] if why else []
+    tables = {
+        Kind.LAST_SEEN: (shown.last_view_to_dict, shown.print_last_views),
+        Kind.VISIBLE: (shown.sighting_to_dict, lambda rows: shown.print_sightings(rows, "P(seen)")),
+        Kind.EXPECTED: (shown.sighting_to_dict, lambda rows: shown.print_sightings(rows, "P(found)")),
+        Kind.LOOK: (shown.viewpoint_to_dict, shown.print_viewpoints),
+    }
+    if why and question.kind in tables:
+        raise UserError(f"--why explains what things are; it does not go with {question.kind.value}")
+    to_dict, print_all = tables.get(question.kind, (shown.answer_to_dict, print_answers))
+    explained = [(answer, _explanation(answer, question, object_map)) for answer in answers] if why else []
     if as_json:
-        documents = [_answer_to_dict(answer) for answer in answers]
+        documents = [to_dict(answer) for answer in answers]
         for document, (_, explanation) in zip(documents, explained, strict=False):
             document["why"] = explanation.to_dict()
         typer.echo(json.dumps(documents, indent=1, ensure_ascii=False))
     elif explained:
         print_explained(explained)
     elif answers:
-        print_answers(answers)
+        print_all(answers)
     else:
-        typer.echo(f"no {label} with a probability of at least {min_probability:g} among {len(object_map)} things")
+        typer.echo(nothing_found(question, object_map))
 
 
-def _unknown(label: str, object_map: ObjectMap) -> str:
-    classes = sorted(object_map.classes)
-    near = difflib.get_close_matches(label.casefold(), classes, n=1)
-    guess = f"did you mean {near[0]}? " if near else ""
-    more = f" and {len(classes) - LISTED} more" if len(classes) > LISTED else ""
-    known = ", ".join(classes[:LISTED]) or "none"
-    return f"no label {label!r} in this map; {guess}its labels are: {known}{more}"
-
-
-def _answer_to_dict(answer: Answer) -> dict[str, Any]:
-    from ..map.map_file import thing_to_dict
-
-    distance = {} if answer.distance is None else {"distance": answer.distance, "distance_std": answer.distance_std}
-    return {"answer_probability": answer.probability, **distance, **thing_to_dict(answer.thing)}
+def _explanation(answer: Answer, question: Question, object_map: ObjectMap) -> Explanation:
+    """Why the thing is what was asked for: of several labels that were meant, the one that it most probably is."""
+    labels = object_map.understand(question.label).labels if question.label else ()
+    thing = answer.thing
+    return thing.explain(max(labels, key=thing.belief) if labels else None)

@@ -26,7 +26,7 @@ def print_things(things: Iterable[Thing]) -> None:
     if not ranked:
         return
     headers = ("label", "P", "existence", "x, y, z ± std, m", "size, m", "for/hidden/against", "id")
-    _print_table(headers, [_thing_cells(thing) for thing in ranked[:LARGEST]])
+    print_table(headers, [_thing_cells(thing) for thing in ranked[:LARGEST]])
     if len(ranked) > LARGEST:
         print(f"and {len(ranked) - LARGEST} more")
 
@@ -40,7 +40,7 @@ def print_answers(answers: Sequence[Answer]) -> None:
     for answer in answers:
         distance = (f"{answer.distance:.3f} ± {answer.distance_std:.3f}",) if with_distance else ()
         rows.append((probability_text(answer.probability), *distance, *_thing_cells(answer.thing)))
-    _print_table(headers, rows)
+    print_table(headers, rows)
 
 
 def print_explained(answers: Iterable[tuple[Answer, Explanation]]) -> None:
@@ -62,7 +62,8 @@ def _thing_cells(thing: Thing) -> tuple[str, ...]:
     return thing.label, *known, position, size, counts, thing.id
 
 
-def _print_table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+def print_table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Rows of cells under heads; what is in a cell is shown as it is."""
     from rich import box
     from rich.console import Console
     from rich.table import Table

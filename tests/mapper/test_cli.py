@@ -92,7 +92,7 @@ def test_query_for_what_is_not_there(thingmap, out):
     result = thingmap("query", out, "book")
     assert result.exit_code == 0 and "no book with a probability of at least 0.05 among 3 things" in result.stdout
     assert json.loads(thingmap("query", out, "book", "--json").stdout) == []
-    assert_mistake(thingmap("query", out, "bowls"), "did you mean bowl?", "its labels are: book, bowl, cup")
+    assert_mistake(thingmap("query", out, "bowtie"), "did you mean bowl?", "its labels are: book, bowl, cup")
 
 
 def test_query_without_a_map(thingmap, tmp_path):
