@@ -10,6 +10,7 @@ from typing import Any
 from ..map.atomic import write_atomic
 from ..map.store import OutputFolder
 from ..map.thing import Thing
+from .chosen import read_things
 
 AXES = ("x", "y", "z")
 COLUMNS = (
@@ -20,15 +21,18 @@ COLUMNS = (
     *(f"size_{axis}" for axis in AXES),
     *(f"size_std_{axis}" for axis in AXES),
     *("yaw", "first_seen", "last_seen", "supporting", "occluded", "contradicting"),
+    "name",
 )
 
 
-def export_csv(folder: OutputFolder, file: Path) -> int:
+def export_csv(folder: OutputFolder, file: Path, *, min_existence: float = 0.0) -> int:
     """Write one row a thing under `COLUMNS`, in metres, radians and seconds; returns the number of things.
 
-    `std_*` are the square roots of the position covariance's diagonal, `cov_*` its other entries in m^2.
+    Positions are in the map's frame, which `map.json` names; sizes are along the box's own axes, the third along up.
+    `std_*` are the square roots of the position covariance's diagonal, `cov_*` its other entries in m^2. Things
+    whose existence is below `min_existence` are left out.
     """
-    object_map = folder.read_map()
+    object_map = read_things(folder, min_existence)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
@@ -50,4 +54,5 @@ def _row(thing: Thing) -> list[Any]:
         *thing.size_std.tolist(),
         *(thing.yaw, thing.first_seen, thing.last_seen),
         *(thing.evidence.supporting, thing.evidence.occluded, thing.evidence.contradicting),
+        thing.name or "",
     ]

@@ -7,15 +7,16 @@ from pathlib import Path
 from ..map.atomic import write_atomic
 from ..map.map_file import format_document, to_document
 from ..map.store import OutputFolder
+from .chosen import read_things
 
 
-def export_json(folder: OutputFolder, file: Path) -> int:
+def export_json(folder: OutputFolder, file: Path, *, min_existence: float = 0.0) -> int:
     """Write the map as JSON; returns the number of things.
 
     To each thing of the document is added `corners`, 8 x 3 metres in map coordinates: bottom round, then top round in
-    the same order. `ObjectMap.load` reads the result.
+    the same order. `ObjectMap.load` reads the result. Things whose existence is below `min_existence` are left out.
     """
-    object_map = folder.read_map()
+    object_map = read_things(folder, min_existence)
     document = to_document(object_map, include_doubtful=True)  # what the folder holds was chosen when it was written
     R_world_upright = object_map.R_world_upright
     for record, thing in zip(document["things"], object_map.things, strict=True):

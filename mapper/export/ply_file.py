@@ -12,6 +12,7 @@ from ..map.atomic import replacing
 from ..map.boxes import EDGES, inside_box
 from ..map.object_map import ObjectMap
 from ..map.store import OutputFolder
+from .chosen import read_things
 from .colors import class_color
 
 DOT_SPACING = 0.005  # m between the points drawn along a box's edges
@@ -25,18 +26,19 @@ VERTEX = [
 EDGE = [("vertex1", "<i4"), ("vertex2", "<i4"), ("red", "u1"), ("green", "u1"), ("blue", "u1")]
 
 
-def export_ply(folder: OutputFolder, file: Path) -> int:
+def export_ply(folder: OutputFolder, file: Path, *, min_existence: float = 0.0) -> int:
     """Write the cloud and the boxes as binary PLY; returns the number of things.
 
     Vertices are, in this order: 8 corners for each thing (thing i has 8i to 8i + 7), the points of the cloud, and dots
     along the edges of the boxes, for viewers that do not draw PLY's `edge` element. Each has its colour and
     `label`: 0 for none, else the number of a class that a comment line names (`comment label 3 "cup"`);
     `thing`: 0 for none, else the number of a thing (`comment thing 1 "thing-0007"`).
-    Points of the cloud keep their own colour and take label and thing from the smallest box that they are in.
+    Points of the cloud keep their own colour and take label and thing from the smallest box that they are in. Things
+    whose existence is below `min_existence` are left out.
     """
     from plyfile import PlyData, PlyElement
 
-    object_map = folder.read_map()
+    object_map = read_things(folder, min_existence)
     labels = _labels(object_map)
     corners = _corners(object_map)
     colors = np.array([class_color(thing.label) for thing in object_map.things], dtype=np.uint8).reshape(-1, 3)
