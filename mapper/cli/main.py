@@ -14,6 +14,7 @@ from typer.core import TyperGroup
 
 from .compare import compare
 from .detect import detect
+from .edit import edit
 from .evaluate import evaluate
 from .export import export
 from .info import info
@@ -23,6 +24,7 @@ from .query import query
 from .run import run
 from .synth import synth
 from .train import train
+from .view import view
 
 # What the parser raises for a bad option; typer carries its own copy of click since 0.26 and shows only this subclass.
 UsageProblem: type[Exception] = next(cls for cls in typer.BadParameter.__mro__ if cls.__name__ == "ClickException")
@@ -77,8 +79,9 @@ app = typer.Typer(
     add_completion=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, detect, label, query, export, info, evaluate, compare, synth, learn):
+for command in (run, detect, label, query, view, export, info, evaluate, compare, synth, learn):
     app.command()(command)
+app.add_typer(edit, name="edit")
 app.add_typer(train, name="train")
 
 
