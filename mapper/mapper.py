@@ -32,6 +32,7 @@ from .estimation.lifting import LiftedDetection, lift
 from .estimation.outcomes import Outcome
 from .estimation.scene import Scene
 from .estimation.view import View
+from .glimpse import Glimpse
 from .map.compose import compose_things
 from .map.object_map import ObjectMap
 from .queries.answer import PROBABLE
@@ -95,6 +96,7 @@ class SemanticMapper:
         self._observer: Observer | None = None
         self._followers: Followers | None = None
         self._model: EvidenceModel | None = None
+        self._detected: tuple[int, Detections] | None = None  # of the last frame with detections, for `glimpse`
 
     def process_frame(self, frame: Frame, detections: Detections | None = None) -> MapUpdate:
         """Adds one frame.
@@ -247,6 +249,22 @@ class SemanticMapper:
             "stages": self._clock.summary(),
         }
 
+    def glimpse(self) -> Glimpse | None:
+        """What is known between two frames, for a live view; None before the first frame."""
+        if not self._camera.started:
+            return None
+        smoother = self._camera.smoother
+        return Glimpse(
+            T_world_keyframe=smoother.poses(),
+            loops=np.array([(loop.a, loop.b) for loop in smoother.loops().values()], dtype=np.int64).reshape(-1, 2),
+            R_world_upright=smoother.R_world_upright,
+            landmarks=tuple(self._scene.landmarks.values()),
+            candidates=len(self._scene.tracks),
+            classes=self._classes or (),
+            detected=self._detected,
+            stages=self._clock.latest(),
+        )
+
     def save_ledger(self, path: Path) -> None:
         """Writes every measurement, from which the graph can be rebuilt (`Ledger.load`)."""
         if self._camera.started:
@@ -270,6 +288,7 @@ class SemanticMapper:
                 f"frame {frame.name}: expected detections over the same {len(self._classes)} classes as before, found "
                 f"{len(detections.classes)} classes; use one detector for a map"
             )
+        self._detected = frame.index, detections
         return detections
 
     def _lift(self, detections: Detections, frame: Frame) -> list[LiftedDetection]:

@@ -26,6 +26,8 @@ class Update(Protocol):
     @property
     def is_keyframe(self) -> bool: ...
     @property
+    def T_world_camera(self) -> np.ndarray: ...
+    @property
     def things(self) -> int: ...
 
 
@@ -48,13 +50,17 @@ class Mapper(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Progress:
-    """Where the run is: `done` of `total` frames, `skipped` among them; `update` is None for a skipped frame."""
+    """Where the run is: `done` of `total` frames, `skipped` among them.
+
+    `update` is what the mapper said of the `frame` at hand; both are None for a skipped one.
+    """
 
     done: int
     total: int
     skipped: int
     things: int
     update: Update | None
+    frame: Frame | None = None
 
 
 class SequenceRun:
@@ -127,7 +133,8 @@ class SequenceRun:
             if self._on_update is not None:
                 skipped = sum(len(names) for names in self._skipped.values())
                 done, total = reading.position + 1, len(self._sequence)
-                self._on_update(Progress(done, total, skipped, self._things, update))
+                frame = reading.result if update is not None and isinstance(reading.result, Frame) else None
+                self._on_update(Progress(done, total, skipped, self._things, update, frame))
             self._position = reading.position + 1
             asked = time.perf_counter()
 

@@ -25,6 +25,10 @@ class StageClock:
         finally:
             self._readings.setdefault(name, array("f")).append(1e3 * (time.perf_counter() - start))
 
+    def latest(self) -> dict[str, tuple[int, float]]:
+        """Per stage: how often it was timed so far, and the milliseconds of the last time."""
+        return {name: (len(readings), readings[-1]) for name, readings in self._readings.items()}
+
     def summary(self) -> dict[str, dict[str, float]]:
         """Per stage: count, median_ms, p95_ms, total_s."""
         return {

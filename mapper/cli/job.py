@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from .edit import pending_lines
 from .interrupt import stop_on_interrupt
 from .progress import FrameProgress
 from .sources import missing_line, skipped_line
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
     from ..map.object_map import ObjectMap
     from ..map.store import OutputFolder
     from ..runner import Mapper, Progress, SequenceRun
+    from ..view.live import LiveView
 
 
 @dataclass(slots=True)
@@ -35,6 +38,7 @@ class MappingJob:
         command: the options, for the report.
         include_doubtful: write things whose existence is below 0.5 too.
         snapshots: after how many mapped frames to write the map besides.
+        live: opens the view of whoever watches; None by default.
     """
 
     sequence: Sequence
@@ -46,6 +50,7 @@ class MappingJob:
     command: dict[str, Any]
     include_doubtful: bool
     snapshots: tuple[int, ...] = ()
+    live: AbstractContextManager[LiveView | None] = field(default_factory=nullcontext)
     _run: SequenceRun = field(init=False)
 
     def execute(self) -> None:
@@ -56,13 +61,18 @@ class MappingJob:
             UserError: nothing could be mapped, or a mistake of the user came to light on the way.
             Exception: whatever else ended the run.
         """
+        with self.live as live:
+            self._execute(live)
+
+    def _execute(self, live: LiveView | None) -> None:
         from ..runner import SequenceRun
         from ..snapshots import SnapshotWriter
 
         write_snapshot = SnapshotWriter(self.folder, self.mapper, self.snapshots)
         with stop_on_interrupt() as should_stop:
             with FrameProgress("mapping", len(self.sequence)) as progress:
-                self._run = SequenceRun(self.sequence, self.mapper, _shower(progress, write_snapshot), should_stop)
+                told = [write_snapshot] if live is None else [write_snapshot, live]
+                self._run = SequenceRun(self.sequence, self.mapper, _shower(progress, told), should_stop)
                 try:
                     self._run.execute()
                 except Exception as error:
@@ -70,6 +80,8 @@ class MappingJob:
                     raise
             missing = missing_line(self.spec, self.detector, self._run.report)
             object_map = self._save() if self._run.report.frames_used else None
+            if live is not None and object_map is not None:
+                live.finish(object_map)
         self._tell(object_map, missing)
 
     def _save(self) -> ObjectMap:
@@ -105,12 +117,24 @@ class MappingJob:
         print_things(object_map.things)
         pace = f"{report.frames_used} frames in {report.seconds:.1f} s, {report.frames_per_second:.1f} frames/s"
         typer.echo(f"{len(object_map)} things from {pace}, {report.keyframes} keyframes; the map is in {path}")
-        batch = self.mapper.statistics().get("batch")
-        if batch is not None:
-            typer.echo(_batch_line(batch))
+        for line in pending_lines(path):
+            typer.echo(line, err=True)
+        statistics = self.mapper.statistics()
+        if "batch" in statistics:
+            typer.echo(_batch_line(statistics["batch"]))
+        if "tracks" in statistics:
+            typer.echo(_tracks_line(statistics["tracks"]))
         if report.stopped:
             typer.echo(f"{report.stopped}; what was mapped before is in {path}", err=True)
             raise typer.Exit(130)
+
+
+def _tracks_line(tracks: dict[str, Any]) -> str:
+    """What linking detections did, of `TrackMapper.statistics`."""
+    return (
+        f"{tracks['observations']} detections in {tracks['views']} views became {tracks['tracks']} tracks: "
+        f"{tracks['kept']} kept, {tracks['background']} likeliest background, {tracks['dropped']} seen too seldom"
+    )
 
 
 def _batch_line(batch: dict[str, Any]) -> str:
@@ -126,9 +150,10 @@ def _batch_line(batch: dict[str, Any]) -> str:
     )
 
 
-def _shower(progress: FrameProgress, then: Callable[[Progress], None]) -> Callable[[Progress], None]:
+def _shower(progress: FrameProgress, told: Iterable[Callable[[Progress], None]]) -> Callable[[Progress], None]:
     def show(now: Progress) -> None:
-        then(now)
+        for tell in told:
+            tell(now)
         if now.done == now.skipped:
             return  # nothing is mapped yet, and perhaps nothing can be
         skipped = f", {now.skipped} skipped" if now.skipped else ""

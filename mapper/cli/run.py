@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from ...datasets.sequence import Sequence
     from ...detectors.detector import Detector
     from ..config import MapperConfig, OdometryConfig
-    from ..runner import Mapper
+    from ..mapper import SemanticMapper
 
 
 class Inference(StrEnum):
@@ -65,6 +66,14 @@ def run(
     snapshots: Annotated[
         str | None, typer.Option(metavar="N,N,...", help="Write the map after so many frames too, for `evaluate`.")
     ] = None,
+    view: Annotated[bool, typer.Option("--view", help="Watch it in a window; needs the extra `view`.")] = False,
+    serve: Annotated[
+        int | None,
+        typer.Option(min=1024, max=65534, metavar="PORT", help="Watch it in a browser, on this machine's PORT."),
+    ] = None,
+    save: Annotated[
+        Path | None, typer.Option(metavar="FILE.rrd", help="Record the live view, to be opened with `rerun FILE.rrd`.")
+    ] = None,
 ) -> None:
     """Map a sequence.
 
@@ -81,20 +90,23 @@ def run(
     from ..map.store import OutputFolder
     from ..snapshots import parse_snapshot_frames
     from .job import MappingJob
+    from .live import live_targets, watching
 
     if views is not None and inference is not Inference.BATCH:
         raise UserError(
             f"--views {views}: only of use with --inference {Inference.BATCH}; add it, or leave out --views"
         )
     OutputFolder.check(output, overwrite)
+    live = live_targets(view, serve, save, overwrite)
     frames = open_sequence(sequence, dataset=dataset, stride=stride, max_frames=max_frames)
     settings = _settings(config, seed, odometry, default_config(frames))
     _check_odometry(settings.odometry, frames, sequence)
     spec = choose_detector(detector, sequence, frames)
     detect = make_detector(spec, frames)
+    mapper = _make_mapper(frames, detect, settings, inference, views)
     MappingJob(
         sequence=frames,
-        mapper=_make_mapper(frames, detect, settings, inference, views),
+        mapper=mapper,
         detector=detect,
         spec=spec,
         folder=OutputFolder.create(output, overwrite),
@@ -109,6 +121,7 @@ def run(
         },
         include_doubtful=include_doubtful,
         snapshots=parse_snapshot_frames(snapshots) if snapshots is not None else (),
+        live=watching(live, mapper, settings.cloud, frames.name) if live is not None else nullcontext(),
     ).execute()
 
 
@@ -124,7 +137,7 @@ def _inference_options(inference: Inference, views: int | None) -> dict[str, str
 
 def _make_mapper(
     frames: Sequence, detect: Detector, settings: MapperConfig, inference: Inference, views: int | None
-) -> Mapper:
+) -> SemanticMapper:
     about = {"source": frames.name, "gravity": frames.gravity}
     if inference is Inference.BATCH:
         from ..batch.batch_mapper import BatchMapper

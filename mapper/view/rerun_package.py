@@ -1,0 +1,41 @@
+"""rerun, where it is installed: an extra of thingmap that nothing but these viewers imports."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...datasets.errors import UserError
+
+EXTRA = 'pip install "thingmap[view]"'
+APPLICATION = "thingmap"
+
+
+def import_rerun() -> Any:
+    """The module `rerun`.
+
+    Raises:
+        UserError: it is not installed, or is of another kind than is known here.
+    """
+    try:
+        import rerun
+        import rerun.blueprint
+    except ImportError as error:
+        raise UserError(f"the live view needs rerun ({error}); install it with {EXTRA}") from None
+    if not hasattr(rerun, "GrpcServerSink"):
+        version = getattr(rerun, "__version__", "another package of that name")
+        raise UserError(f"the live view needs a newer rerun-sdk, found {version}; install it with {EXTRA}")
+    return rerun
+
+
+def new_recording(source: str) -> Any:
+    """A `rerun.RecordingStream` without sinks, named after what is mapped.
+
+    Of rerun's own clocks none is recorded: what was logged when says nothing about a map, and makes two recordings of
+    the same run differ.
+    """
+    rr = import_rerun()
+    recording = rr.RecordingStream(APPLICATION)
+    rr.set_log_time_enabled(False, recording=recording)
+    rr.set_log_tick_enabled(False, recording=recording)
+    recording.send_recording_name(source)
+    return recording
