@@ -8,7 +8,8 @@ from pathlib import Path
 
 from . import folder, kitti, kitti_raw, pcd_folder, rgbd_scenes_v1, rgbd_scenes_v2, seven_scenes, tum, tum_keyframes
 from .errors import InputError, UserError
-from .paths import user_path
+from .path_options import split_options
+from .ros import open as ros
 from .sequence import Sequence
 from .views import subset
 
@@ -23,14 +24,18 @@ class Loader:
     Attributes:
         dataset: what the user calls it.
         layout: the files it is recognised by, for people.
-        find: the sequence folders of this layout at a path.
-        open: opens one of them.
+        find: the sequences of this layout at a path: folders, and files where the layout is one file.
+        open: opens one of them; it takes the options as keywords.
+        options: what may be told after the path, as `PATH?KEY=VALUE&KEY=VALUE`.
+        suffixes: of a file that is a sequence alone.
     """
 
     dataset: str
     layout: str
     find: Callable[[Path], list[Path]]
-    open: Callable[[Path], Sequence]
+    open: Callable[..., Sequence]
+    options: tuple[str, ...] = ()
+    suffixes: tuple[str, ...] = ()
 
 
 LOADERS = (
@@ -46,6 +51,7 @@ LOADERS = (
     Loader("kitti", kitti.LAYOUT, kitti.find_kitti, kitti.open_kitti),
     Loader("kitti", kitti_raw.LAYOUT, kitti_raw.find_kitti_raw, kitti_raw.open_kitti_raw),
     Loader("pcd", pcd_folder.LAYOUT, pcd_folder.find_pcd_folder, pcd_folder.open_pcd_folder),
+    Loader("ros", ros.LAYOUT, ros.find_bags, ros.open_bag, ros.OPTIONS, ros.SUFFIXES),
     Loader("folder", folder.LAYOUT, folder.find_folder, folder.open_folder),
 )
 DATASETS = tuple(dict.fromkeys(loader.dataset for loader in LOADERS))
@@ -57,14 +63,16 @@ def open_sequence(
     """Opens a recorded sequence, a bundled sample or a synthetic world.
 
     Args:
-        spec: a folder, `sample:NAME`, or `synth:PRESET` with parameters as `synthetic.synth.parse_synth` reads them.
+        spec: a folder or a bag of ROS, after which options may be told (`bag.mcap?color=TOPIC&depth=TOPIC`, see
+            `ros.open.open_bag`); `sample:NAME`; or `synth:PRESET` with parameters as `synthetic.synth.parse_synth`
+            reads them.
         dataset: one of `DATASETS`; None to tell by the files in the folder.
         stride: take every n-th frame.
         max_frames: take at most so many of those; None for all.
 
     Raises:
         InputError: there is no such folder, nothing in it is recognised, or it holds several sequences.
-        UserError: an argument is wrong, or there is no such sample or synthetic world.
+        UserError: an argument or an option is wrong, or there is no such sample or synthetic world.
     """
     if str(spec).startswith(SAMPLE_PREFIX):
         from .synthetic.sample import open_sample  # the renderer is slow to import, and recordings do not need it
@@ -74,15 +82,22 @@ def open_sequence(
         from .synthetic.synth import open_synth  # slow to import, too
 
         return subset(open_synth(str(spec)), stride, max_frames)
-    loader, path = _choose(user_path(spec), dataset)
-    return subset(loader.open(path), stride, max_frames)
+    path, options = split_options(spec)
+    loader, place = _choose(path, dataset)
+    unknown = sorted(set(options) - set(loader.options))
+    if unknown:
+        known = f"known are {', '.join(loader.options)}" if loader.options else f"{loader.dataset} has no options"
+        raise UserError(f"{path}: unknown option {unknown[0]!r}; {known}")
+    return subset(loader.open(place, **options), stride, max_frames)
 
 
 def _choose(path: Path, dataset: str | None) -> tuple[Loader, Path]:
     if dataset is not None and dataset not in DATASETS:
         raise UserError(f"unknown dataset {dataset!r}; known are {', '.join(DATASETS)}")
     loaders = [loader for loader in LOADERS if dataset in (None, loader.dataset)]
-    if not path.is_dir():
+    if path.is_file():
+        loaders = [loader for loader in loaders if path.suffix.lower() in loader.suffixes]
+    if not path.is_dir() and not (path.is_file() and loaders):
         found = "a file" if path.exists() else "no such folder"
         expected = f"the folder of a sequence ({dataset or ', '.join(DATASETS)})"
         raise InputError(path, expected, found, f"check the path, or use {SAMPLE_PREFIX}NAME or {SYNTH_PREFIX}PRESET")

@@ -23,21 +23,26 @@ TRIED = 50  # frames, in search of the first that can be used
 
 
 def info(
-    path: Annotated[str, typer.Argument(metavar="PATH", help="A sequence, the OUT of a run, or a detections.json.")],
+    path: Annotated[
+        str, typer.Argument(metavar="PATH", help="A sequence, a bag of ROS, the OUT of a run, or a detections.json.")
+    ],
     dataset: DatasetOption = None,
     stride: StrideOption = 1,
     max_frames: MaxFramesOption = None,
 ) -> None:
     """Show what a sequence, a map or a file of detections holds."""
     from ...datasets.open import open_sequence
+    from ...datasets.ros.bag import SUFFIXES
     from ..map.map_file import FILE_NAME, SCHEMA
 
     place = Path(path)
     if (place / FILE_NAME).is_file():
         lines = [*_map_lines(place), *_report_lines(place)]
-    elif place.is_file():
+    elif place.is_file() and place.suffix.lower() not in SUFFIXES:
         lines = list(_map_lines(place)) if _schema(place) == SCHEMA else list(_detections_lines(place))
     else:
+        for line in _topic_lines(path):  # first: they are wanted most where the sequence cannot be opened
+            typer.echo(line)
         sequence = open_sequence(path, dataset=dataset, stride=stride, max_frames=max_frames)
         lines = [("sequence", sequence.name), ("loader", _loader(path, dataset)), *_sequence_lines(sequence)]
     width = max(len(what) for what, _ in lines)
@@ -53,6 +58,28 @@ def _schema(file: Path) -> object:
     return document.get("schema") if isinstance(document, dict) else None
 
 
+def _topic_lines(path: str) -> Iterator[str]:
+    """One line for each topic where the path is a bag."""
+    from ...datasets.open import SAMPLE_PREFIX, SYNTH_PREFIX
+    from ...datasets.path_options import split_options
+    from ...datasets.ros.bag import Bag
+    from ...datasets.ros.open import find_bags
+    from ...datasets.ros.topics import image_topics
+
+    if path.startswith((SAMPLE_PREFIX, SYNTH_PREFIX)):
+        return
+    place, _ = split_options(path)
+    bags = find_bags(place) if place.exists() else []
+    if len(bags) != 1:
+        return
+    bag = Bag(bags[0])
+    images = {image.topic.name: image for image in image_topics(bag)}
+    for name, topic in bag.topics.items():
+        image = images.get(name)
+        of = "" if image is None else f", {image.encoding} {image.size[0]} x {image.size[1]} in {image.frame_id}"
+        yield f"topic {name}  {topic.type}, {topic.count} messages{of}"
+
+
 def _sequence_lines(sequence: Sequence) -> Iterator[Line]:
     import numpy as np
 
@@ -64,11 +91,26 @@ def _sequence_lines(sequence: Sequence) -> Iterator[Line]:
         seconds = float(sequence.stamps[-1] - sequence.stamps[0])
         rate = f", {(len(sequence) - 1) / seconds:.1f} frames/s" if seconds > 0.0 else ""
         yield "duration", f"{seconds:.2f} s{rate}"
+    yield from _bag_lines(sequence)
     yield "poses", "none" if sequence.poses is None else _poses(np.asarray(sequence.poses))
     down = sequence.gravity
     yield "gravity", "unknown" if down is None else "down is " + ", ".join(f"{x:.3f}" for x in down)
     yield from _truth_lines(sequence)
     yield from _depth_lines(sequence)
+
+
+def _bag_lines(sequence: Sequence) -> Iterator[Line]:
+    """Which topics of a bag the frames come from, and what they leave over."""
+    from ...datasets.ros.sequence import BagSequence
+    from ...datasets.views import Subset
+
+    whole = sequence.sequence if isinstance(sequence, Subset) else sequence
+    if isinstance(whole, BagSequence):
+        topics, unpaired = whole.topics, whole.unpaired
+        yield "colour", f"{topics.color.topic.name}, {unpaired.color} images without depth near their stamp"
+        yield "depth", f"{topics.depth.topic.name}, {unpaired.depth} images without colour near their stamp"
+        yield "calibration", topics.info + (", distortion is removed" if whole.camera.maps else "")
+        yield "accelerometer", "none" if whole.specific_force is None else "in camera axes"
 
 
 def _truth_lines(sequence: Sequence) -> Iterator[Line]:
@@ -85,11 +127,13 @@ def _truth_lines(sequence: Sequence) -> Iterator[Line]:
 def _loader(path: str, dataset: str | None) -> str:
     """Name of the loader that takes this path, and the layout that it knows."""
     from ...datasets.open import LOADERS, SAMPLE_PREFIX, SYNTH_PREFIX
+    from ...datasets.path_options import split_options
 
     if path.startswith((SAMPLE_PREFIX, SYNTH_PREFIX)):
         return "rendered when asked for"
-    place = Path(path).expanduser()
-    fitting = [loader for loader in LOADERS if dataset in (None, loader.dataset) and loader.find(place)]
+    place, _ = split_options(path)
+    able = [loader for loader in LOADERS if not place.is_file() or place.suffix.lower() in loader.suffixes]
+    fitting = [loader for loader in able if dataset in (None, loader.dataset) and loader.find(place)]
     return "; ".join(f"{loader.dataset} ({loader.layout})" for loader in fitting) or str(dataset)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -13,7 +12,7 @@ if TYPE_CHECKING:
     from ..run_report import RunReport
 
 SequenceArgument = Annotated[
-    str, typer.Argument(metavar="SEQUENCE", help="Folder of a sequence, sample:tabletop, or synth:PRESET.")
+    str, typer.Argument(metavar="SEQUENCE", help="Folder of a sequence, bag of ROS, sample:tabletop, or synth:PRESET.")
 ]
 DatasetOption = Annotated[str | None, typer.Option(metavar="NAME", help="Loader; told from the folder by default.")]
 StrideOption = Annotated[int, typer.Option(min=1, metavar="N", help="Take every Nth frame.")]
@@ -28,13 +27,14 @@ def choose_detector(spec: str | None, source: str, sequence: Sequence) -> str:
         UserError: there is neither.
     """
     from ...datasets.errors import UserError
+    from ...datasets.path_options import split_options
     from ...datasets.truth import HasTruth
 
     if spec is not None:
         return spec
     if isinstance(sequence, HasTruth):
         return "simulated"
-    recorded = Path(source).expanduser() / "detections.json"
+    recorded = split_options(source)[0] / "detections.json"
     if recorded.is_file():
         return f"recorded:{recorded}"
     raise UserError(
