@@ -2,13 +2,14 @@
 
     camera-intrinsics.color.txt    3x3
     frame-000000.color.png  frame-000000.depth.png  frame-000000.segm.png or .mask.png
+    frame-000000.pose.txt          4x4 camera-to-world, optional
 
 Depth is that of a reading rotated left by three bits, in 0.1 mm: metres = (value rotated right by 3) / 10000.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -49,8 +50,21 @@ def _view(folder: Path, index: int, name: str, labels: str) -> LabelledView:
     height, width = depth.shape
     camera = read_camera_matrix(folder / "camera-intrinsics.color.txt", width, height)
     frame = Frame(index, name, float(index), np.ascontiguousarray(color[..., ::-1]), metres, camera)
+    pose = folder / f"{name}.pose.txt"
+    if pose.is_file():
+        frame = replace(frame, T_world_camera=_pose(pose))
     _, number = np.unique(label, return_inverse=True)
     return LabelledView(frame, number.reshape(label.shape).astype(np.int32) - 1)
+
+
+def _pose(path: Path) -> np.ndarray:
+    try:
+        T = np.loadtxt(path, dtype=np.float64)
+    except ValueError as error:
+        raise InputError(path, "a 4x4 matrix", str(error), "check that the file is complete") from None
+    if T.shape != (4, 4) or not np.isfinite(T).all():
+        raise InputError(path, "a 4x4 matrix", f"shape {T.shape}", "check that the file is complete")
+    return T
 
 
 def _image(path: Path) -> np.ndarray:

@@ -248,8 +248,8 @@ def describe(measured: Sequence[Measured]) -> str:
         ],
     )
     return (
-        f"Voxels of 1 cm, 640 x 480, every second pixel of every second row. Medians a frame; the limit for six "
-        f"classes is {LIMIT_MS:.0f} ms beyond the detector.\n\n{times}\n\n{memory}"
+        f"Voxels of 1 cm, 640 x 480, every {VoxelConfig().pixel_step}rd pixel of every such row. Medians a frame; the "
+        f"limit for six classes is {LIMIT_MS:.0f} ms beyond the detector.\n\n{times}\n\n{memory}"
     )
 
 

@@ -28,11 +28,11 @@ from ..stages import StageClock
 from .gathering import Gathered, Gatherer, check_classes
 from .instances import Instances, find_instances
 from .label_state import LabelState
-from .labelled_files import write_labelling
+from .labelled_files import read_volumes, write_labelling
 from .labelling import Labels, label_voxels
 from .labelling_config import LabellingConfig
 from .mapped_frames import MappedFrames, mapped_frames
-from .volumes_evidence import volumes_evidence
+from .volumes_evidence import weighted_volumes
 from .voxels import VoxelEvidence, Voxels
 
 FindInstances = Callable[[Voxels, Labels, ObjectMap, LabellingConfig], Instances]
@@ -100,7 +100,7 @@ class LabelJob:
             InputError: the folder holds no run, or one of its files is damaged.
             UserError: sequence or detector do not fit the run.
         """
-        run, clock = load_run(self.folder.path), StageClock()
+        run, clock = replace(load_run(self.folder.path), object_map=read_volumes(self.folder)), StageClock()
         check_can_be_labelled(run, self.sequence, self.detector)
         frames = mapped_frames(run, self.sequence, self.config.stride)
         state, gathered, anew = self._gather(run, frames, clock, on_frame, should_stop)
@@ -112,7 +112,7 @@ class LabelJob:
             raise UserError(f"{self.sequence.name}: none of the {len(frames.stamps)} frames chosen can be read")
         with clock.stage("assembling"):
             voxels = state.evidence.assemble(frames.T_world_keyframe)
-            volumes = self._volumes(voxels, run.object_map)
+            volumes = weighted_volumes(voxels.points, run.object_map, self.config)
         with clock.stage("labelling"):
             labels = label_voxels(voxels, self.config.mrf, volumes)
         find = self.find_instances
@@ -149,15 +149,6 @@ class LabelJob:
                 with clock.stage("saving"):
                     state.save(self.folder.voxels_file)
         return state, gathered, anew
-
-    def _volumes(self, voxels: Voxels, object_map: ObjectMap) -> np.ndarray | None:
-        sources = self.config.sources
-        if sources.volumes == 0.0:
-            return None
-        blur = self.config.voxels.voxel_size / 2.0
-        return np.float32(sources.volumes) * volumes_evidence(
-            voxels.points, object_map, object_map.classes, blur, sources
-        )
 
 
 def check_can_be_labelled(run: MappedRun, sequence: Sequence, detector: Detector) -> None:

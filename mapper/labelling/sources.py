@@ -35,10 +35,10 @@ def evidence_of(
     """
     uv = pixel_grid(frame, step, config.near, config.far)
     if maps is not None:
-        log_p = _logarithms(maps.probabilities, uv, config, maps.background)
+        log_p = _logarithms(maps.probabilities, uv, config.least_maps, config.alpha, maps.background)
         return PixelEvidence(maps.classes, uv, log_p)
     p = _of_detections(frame, detections, step, config)
-    return PixelEvidence(detections.classes, uv, _logarithms(p, uv // step, config))
+    return PixelEvidence(detections.classes, uv, _logarithms(p, uv // step, config.least, config.alpha))
 
 
 def log_probabilities(p: np.ndarray, config: SourceConfig) -> np.ndarray:
@@ -47,16 +47,16 @@ def log_probabilities(p: np.ndarray, config: SourceConfig) -> np.ndarray:
     The background's probability is alpha min_c (1 - p(c | x)) (eq. 5).
     """
     column = np.stack([np.zeros(len(p), np.int32), np.arange(len(p), dtype=np.int32)], axis=1)
-    return _logarithms(p.T[:, :, None], column, config)
+    return _logarithms(p.T[:, :, None], column, config.least, config.alpha)
 
 
 def _logarithms(
-    p: np.ndarray, uv: np.ndarray, config: SourceConfig, background: np.ndarray | None = None
+    p: np.ndarray, uv: np.ndarray, least: float, alpha: float, background: np.ndarray | None = None
 ) -> np.ndarray:
     """The same of some pixels (column, row) of (K, H, W) maps; of the (H, W) background where that is given."""
     p = np.ascontiguousarray(p, dtype=np.float32)
     given = np.empty((0, 0), np.float32) if background is None else np.ascontiguousarray(background, dtype=np.float32)
-    return _take(p, given, np.ascontiguousarray(uv), config.least, config.alpha)
+    return _take(p, given, np.ascontiguousarray(uv), least, alpha)
 
 
 @njit(cache=True)

@@ -30,6 +30,9 @@ class ValidationConfig:
             object also where that is round.
         tolerance: metres that a point may be off the depth measured where it appears: one behind is hidden, one in
             front is not there any more. Two voxels, the noise of a Kinect at 2 m, and slant.
+        share: of the points in the whole box, from which on its own label keeps it too: what stands before an object
+            hides its middle. (The paper's rule is the middle alone.) On two training tables with simulated boxes that
+            lost 8 and 12 points of recall, and with this 0 and 2; false boxes went the same. 0.1 to 0.3 are alike.
         least_points: in the central region, below which nobody knows, and the box stays.
 
     Raises:
@@ -38,11 +41,12 @@ class ValidationConfig:
 
     central: float = 0.5
     tolerance: float = 0.04
+    share: float = 0.2
     least_points: int = 3
 
     def __post_init__(self) -> None:
-        if not (0.0 < self.central <= 1.0 and self.tolerance > 0.0 and self.least_points >= 1):
-            raise UserError(f"expected central in (0, 1], tolerance > 0 and least_points >= 1, but got {self}")
+        if not (0.0 < self.central <= 1.0 and self.share > 0.0 and self.tolerance > 0.0 and self.least_points >= 1):
+            raise UserError(f"expected central in (0, 1], share and tolerance > 0, least_points >= 1, but got {self}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,16 +93,19 @@ class Validator:
 
     def validate(self, detections: Detections, frame: Frame, T_world_camera: np.ndarray) -> np.ndarray:
         """(D,) bool: which of D detections stay: those whose label is that of most visible points in the middle, or
-        where too few points are seen to know. Of labels that are equally many, any may be the box's.
+        of enough in the whole box, or where too few points are seen to know. Of labels that are equally many, any may
+        be the box's.
 
         Raises:
             UserError: the detector finds classes that the map does not have.
         """
         check_classes(detections.classes, self.classes)
         uv, rows = visible_points(self.points, frame, T_world_camera, self.config.tolerance)
-        votes = central_votes(detections.xyxy, uv, self.labels[rows], len(self.classes), self.config.central)
-        column = _columns(detections.classes, self.classes)[detections.class_id]
-        agrees = votes[np.arange(len(votes)), column] == votes.max(axis=1, initial=0)
+        seen = uv, self.labels[rows], len(self.classes)
+        votes, whole = (central_votes(detections.xyxy, *seen, share) for share in (self.config.central, 1.0))
+        own = np.arange(len(votes)), _columns(detections.classes, self.classes)[detections.class_id]
+        agrees = votes[own] == votes.max(axis=1, initial=0)
+        agrees |= whole[own] >= self.config.share * whole.sum(axis=1)
         return agrees | (votes.sum(axis=1) < self.config.least_points)
 
 

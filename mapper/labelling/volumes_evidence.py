@@ -10,10 +10,20 @@ from scipy.special import ndtr
 from ..map.boxes import box_axes
 from ..map.object_map import ObjectMap
 from ..map.thing import Thing
-from .labelling_config import SourceConfig
+from .labelling_config import LabellingConfig, SourceConfig
 from .sources import log_probabilities
 
 REACH = 3.0  # standard deviations beyond its sides to which a box is looked at
+
+
+def weighted_volumes(points: np.ndarray, object_map: ObjectMap, config: LabellingConfig) -> np.ndarray | None:
+    """What is added to the evidence of voxels at (N, 3) mean `points`: that of the map's volumes for its classes, as
+    much as `config.sources.volumes` says; None where that is nothing."""
+    sources = config.sources
+    if sources.volumes == 0.0:
+        return None
+    blur = config.voxels.voxel_size / 2.0
+    return np.float32(sources.volumes) * volumes_evidence(points, object_map, object_map.classes, blur, sources)
 
 
 def volumes_evidence(

@@ -20,12 +20,17 @@ from thingmap.mapper.evaluation.points.labelled_points import label_points
 from thingmap.mapper.labelling.label_run import LabelJob, LabelReport
 from thingmap.mapper.labelling.labelling_config import LabellingConfig
 from thingmap.mapper.labelling.mrf_config import MrfConfig, Smoothness
+from thingmap.mapper.labelling.voxel_config import VoxelConfig
 from thingmap.mapper.map.store import OutputFolder
 
 SYNTH = "synth:tabletop?seed=3&frames=16&width=240&clutter=low"
 FRAMES = 16
 DETECTOR = "simulated?half_side=6&score_side=7&background_spots=0&chance_rate=0"  # one for small images
-CONFIG = LabellingConfig(stride=2, mrf=MrfConfig(smoothness=Smoothness.COLOUR))
+CONFIG = LabellingConfig(
+    stride=2,
+    voxels=VoxelConfig(pixel_step=2),  # images are small
+    mrf=MrfConfig(smoothness=Smoothness.COLOUR),
+)
 LOOKED_AT = FRAMES // 2
 
 

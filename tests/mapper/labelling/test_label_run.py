@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from thingmap.datasets.open import open_sequence
 from thingmap.detectors.detections import Detections
 from thingmap.mapper.export.colors import class_color
 from thingmap.mapper.labelling.instances import Instances, ThingPoints
-from thingmap.mapper.labelling.labelling_config import LabellingConfig, SourceConfig
+from thingmap.mapper.labelling.labelling_config import SourceConfig
 from thingmap.mapper.labelling.mrf_config import MrfConfig, Smoothness
 from thingmap.mapper.map.object_map import ObjectMap
 from thingmap.mapper.map.store import OutputFolder
@@ -64,7 +65,11 @@ def test_the_map_is_otherwise_as_it_was(first, run):
     del after["labels"]
     for thing in after["things"]:
         del thing["points"]
-        assert (thing.pop("points_size", None) is None) == (thing.pop("points_size_std", None) is None)
+        changed = "points_size" in thing
+        for name in ("size", "size_std"):  # where points have changed it, the old one is beside it
+            assert (f"volume_{name}" in thing) == (f"points_{name}" in thing) == changed
+            assert thing.pop(f"points_{name}", thing[name]) == thing[name]
+            thing[name] = thing.pop(f"volume_{name}", thing[name])
     assert after == before
     ObjectMap.load(first.out).things[0].explain()  # the evidence file still fits
 
@@ -77,14 +82,14 @@ def test_most_points_of_objects_are_labelled_right(first, run):
 @pytest.mark.parametrize("fast", [False, True])
 @pytest.mark.parametrize("smoothness", list(Smoothness))
 def test_every_term_labels_from_the_same_voxels(out, smoothness, fast):
-    config = LabellingConfig(stride=2, mrf=MrfConfig(smoothness=smoothness, fast=fast))
+    config = replace(CONFIG, mrf=MrfConfig(smoothness=smoothness, fast=fast))
     report = label(out, config)
     assert report.added == 0 and len(report.points) > 3 and report.points["background"] > 0.8 * report.voxels
     assert (report.labels.pairs > report.voxels) == (smoothness is not Smoothness.NONE)
 
 
 def test_things_volumes_can_be_left_out(out, first):
-    config = LabellingConfig(stride=2, sources=SourceConfig(volumes=0.0), mrf=CONFIG.mrf)
+    config = replace(CONFIG, sources=SourceConfig(volumes=0.0))
     report = label(out, config)
     assert report.added == 0 and report.points != first.report.points
 

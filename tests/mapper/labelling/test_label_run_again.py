@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from label_runs import CONFIG, DETECTOR, LOOKED_AT, Labelled, label, labelled, m
 
 from thingmap.detectors.spec import make_detector
 from thingmap.mapper.evaluation.inputs.load_run import load_run
-from thingmap.mapper.labelling.labelling_config import LabellingConfig, SourceConfig
+from thingmap.mapper.labelling.labelling_config import SourceConfig
 from thingmap.mapper.map.object_map import ObjectMap
 from thingmap.mapper.map.store import OutputFolder
 
@@ -52,7 +53,7 @@ def test_gathered_again_it_is_the_same(out):
 
 
 def test_only_new_frames_are_looked_at(out, first):
-    config = LabellingConfig(stride=1, mrf=CONFIG.mrf)
+    config = replace(CONFIG, stride=1)
     report = label(out, config)
     assert report.added == LOOKED_AT and report.frames == 2 * LOOKED_AT and not report.anew
     back = label(out)  # fewer than there are: what is in a voxel cannot be taken out
@@ -109,7 +110,7 @@ def test_when_all_moves_the_points_go_along(out, first):
     stamps, poses = OutputFolder.open(out).read_trajectory()
     poses[:, 0, 3] += 0.5
     OutputFolder.open(out).write_trajectory(stamps, poses)
-    config = LabellingConfig(stride=2, sources=SourceConfig(volumes=0.0), mrf=CONFIG.mrf)
+    config = replace(CONFIG, sources=SourceConfig(volumes=0.0))
     report = label(out, config)
     assert report.added == 0
     after = load_run(out).cloud()[0]

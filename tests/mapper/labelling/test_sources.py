@@ -15,7 +15,7 @@ from thingmap.mapper.labelling.labelling_config import SourceConfig
 from thingmap.mapper.labelling.pixel_evidence import PixelEvidence, pixel_grid
 from thingmap.mapper.labelling.sources import evidence_of, log_probabilities
 
-CONFIG = SourceConfig(least=0.01, gamma=25.0, alpha=0.1)
+CONFIG = SourceConfig(least=0.01, least_maps=0.015, gamma=25.0, alpha=0.1)
 
 
 def detections(xyxy, scores, part=None, mask=None):
@@ -120,7 +120,7 @@ def test_maps_are_taken_as_they_are_within_bounds():
     maps = ProbabilityMaps.of(CLASSES, p, alpha=0.3)
     evidence = evidence_of(frame, detections([[7, 5, 22, 20]], [[0.99, 0.0, 0.0]]), maps, 2, CONFIG)
     np.testing.assert_allclose(of_pixel(evidence, 8, 6), [*p[:, 6, 8], 0.3 * (1.0 - p[:, 6, 8].max())], rtol=1e-5)
-    np.testing.assert_allclose(of_pixel(evidence, 6, 4)[0], 0.01, rtol=1e-5)
+    np.testing.assert_allclose(of_pixel(evidence, 6, 4)[0], 0.015, rtol=1e-5)
 
 
 def test_pixels_are_every_so_many_whose_depth_is_in_range():

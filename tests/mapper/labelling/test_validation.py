@@ -69,6 +69,18 @@ def test_only_the_middle_counts():
     assert not make_validator(*make_points(), central=0.9).validate(found, frame, np.eye(4)).any()
 
 
+def test_a_box_stays_whose_middle_is_hidden():
+    """A box of a bowl, whose middle is a cup's: the bowl's own points are a quarter of those in the box, or fewer."""
+    points, labels = make_points()
+    frame, around = make_frame(), (20.0, 12.0, 44.0, 36.0)  # 24 x 24 pixels about the cup's 16 x 16
+    side = INTRINSICS.project(points)[:, 0] < 24.0
+    labels = np.where((labels == NO_OBJECT) & side, BOWL, labels)  # 2 of 12 columns: a sixth
+    found = boxes((around, BOWL))
+    for share, stays in ((0.1, True), (0.3, False)):
+        validator = make_validator(points, labels, share=share)
+        assert validator.validate(found, frame, np.eye(4)).tolist() == [stays]
+
+
 def test_what_no_points_speak_of_stays():
     points, labels = make_points()
     nothing = make_validator(points[:0], labels[:0])
