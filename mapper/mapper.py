@@ -96,6 +96,7 @@ class SemanticMapper:
         self._observer: Observer | None = None
         self._followers: Followers | None = None
         self._model: EvidenceModel | None = None
+        self._embedding_length: int | None = None
         self._detected: tuple[int, Detections] | None = None  # of the last frame with detections, for `glimpse`
 
     def process_frame(self, frame: Frame, detections: Detections | None = None) -> MapUpdate:
@@ -288,8 +289,20 @@ class SemanticMapper:
                 f"frame {frame.name}: expected detections over the same {len(self._classes)} classes as before, found "
                 f"{len(detections.classes)} classes; use one detector for a map"
             )
+        self._check_embeddings(frame, detections)
         self._detected = frame.index, detections
         return detections
+
+    def _check_embeddings(self, frame: Frame, detections: Detections) -> None:
+        if detections.embedding is None or len(detections) == 0:
+            return
+        length = detections.embedding.shape[1]
+        if self._embedding_length not in (None, length):
+            raise UserError(
+                f"frame {frame.name}: expected embeddings of {self._embedding_length} numbers as before, found "
+                f"{length}; use one detector for a map"
+            )
+        self._embedding_length = length
 
     def _lift(self, detections: Detections, frame: Frame) -> list[LiftedDetection]:
         if self._lifecycle is None:

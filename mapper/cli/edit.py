@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..edits.defaults import MOVE_STD, SAID_PROBABILITY
+from ..edits.defaults import MOVE_STD, RESIZE_STD, SAID_PROBABILITY
 
 if TYPE_CHECKING:
     from ..edits.edit import Edit
@@ -17,8 +17,9 @@ if TYPE_CHECKING:
 edit = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
-    help="Correct a map: relabel, delete, move, merge or name its things. Everything is recorded in OUT/edits.jsonl "
-    "with who, when and why, can be undone, and is done again when the sequence is mapped anew into OUT.",
+    help="Correct a map: relabel, delete, move, resize, merge or name its things. Everything is recorded in "
+    "OUT/edits.jsonl with who, when and why, can be undone, and is done again when the sequence is mapped anew into "
+    "OUT.",
 )
 
 ThingArgument = Annotated[str, typer.Argument(metavar="THING", help="Id of a thing, such as thing-0003.")]
@@ -26,7 +27,7 @@ WhyOption = Annotated[str, typer.Option("--why", metavar="TEXT", help="Reason, f
 WhoOption = Annotated[
     str | None, typer.Option("--who", metavar="NAME", help="Who says so; your login name by default.")
 ]
-CountOption = Annotated[int, typer.Option("-n", "--count", min=1, metavar="N", help="How many.")]
+CountOption = Annotated[int | None, typer.Option("-n", "--count", min=1, metavar="N", help="How many; 1 by default.")]
 
 
 @edit.callback()
@@ -74,6 +75,22 @@ def move(
 
 
 @edit.command()
+def resize(
+    ctx: typer.Context,
+    thing: ThingArgument,
+    to: Annotated[
+        tuple[float, float, float],
+        typer.Option(metavar="X Y Z", help="Its full extents along its box's own axes, metres; Z is the height."),
+    ],
+    std: Annotated[float, typer.Option(metavar="M", help="How sure that is: standard deviation, metres.")] = RESIZE_STD,
+    why: WhyOption = "",
+    who: WhoOption = None,
+) -> None:
+    """Say how large a thing is."""
+    _tell(_editor(ctx, who).resize(thing, to, std, why=why))
+
+
+@edit.command()
 def merge(
     ctx: typer.Context,
     things: Annotated[list[str], typer.Argument(metavar="THING THING ...", help="Ids; the first one stays.")],
@@ -97,15 +114,28 @@ def name(
 
 
 @edit.command()
-def undo(ctx: typer.Context, count: CountOption = 1, why: WhyOption = "", who: WhoOption = None) -> None:
-    """Undo the last edits; they stay in the journal."""
-    _tell(_editor(ctx, who).undo(count, why=why))
+def undo(
+    ctx: typer.Context,
+    number: Annotated[
+        int | None, typer.Argument(metavar="NUMBER", help="Of the edit, as `log` has it; the last one by default.")
+    ] = None,
+    count: CountOption = None,
+    why: WhyOption = "",
+    who: WhoOption = None,
+) -> None:
+    """Undo the last edits, or the one of a NUMBER; they stay in the journal."""
+    from ...datasets.errors import UserError
+
+    if number is not None and count is not None:
+        raise UserError("undo: give the NUMBER of one edit, or with -n how many of the last ones")
+    editor = _editor(ctx, who)
+    _tell(editor.undo(count or 1, why=why) if number is None else editor.undo_edit(number, why=why))
 
 
 @edit.command()
-def redo(ctx: typer.Context, count: CountOption = 1, why: WhyOption = "", who: WhoOption = None) -> None:
+def redo(ctx: typer.Context, count: CountOption = None, why: WhyOption = "", who: WhoOption = None) -> None:
     """Do edits again that were undone."""
-    _tell(_editor(ctx, who).redo(count, why=why))
+    _tell(_editor(ctx, who).redo(count or 1, why=why))
 
 
 @edit.command()

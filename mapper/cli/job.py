@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from .edit import pending_lines
 from .interrupt import stop_on_interrupt
 from .progress import FrameProgress
 from .sources import missing_line, skipped_line
@@ -114,11 +113,14 @@ class MappingJob:
         if object_map is None:
             typer.echo(f"{report.stopped}, before anything was mapped; nothing is written", err=True)
             raise typer.Exit(130)
-        print_things(object_map.things)
+        edited = self.folder.read_map() if self.folder.journal_file.exists() else object_map
+        print_things(edited.things)
         pace = f"{report.frames_used} frames in {report.seconds:.1f} s, {report.frames_per_second:.1f} frames/s"
-        typer.echo(f"{len(object_map)} things from {pace}, {report.keyframes} keyframes; the map is in {path}")
-        for line in pending_lines(path):
-            typer.echo(line, err=True)
+        typer.echo(f"{len(edited)} things from {pace}, {report.keyframes} keyframes; the map is in {path}")
+        if edited.edits.changed:
+            typer.echo(f"they are as people have edited them: `thingmap edit {path} log`")
+        for pending in edited.edits.pending:
+            typer.echo(str(pending), err=True)
         statistics = self.mapper.statistics()
         if "batch" in statistics:
             typer.echo(_batch_line(statistics["batch"]))

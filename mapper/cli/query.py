@@ -23,7 +23,9 @@ def query(
     folder: Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `thingmap run` wrote, or a map.json.")],
     label: Annotated[
         str | None,
-        typer.Argument(metavar="[LABEL]", help='What to look for, or a question: "what is on the table?".'),
+        typer.Argument(
+            metavar="LABEL", help='A label, the name or the id of a thing, or a question: "what is on the table?".'
+        ),
     ] = None,
     near: Annotated[
         tuple[float, float, float] | None,
@@ -64,12 +66,18 @@ def query(
     why: Annotated[
         bool, typer.Option("--why", help="Say after each answer which views spoke for it, and which against.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Answer in JSON, with --why every view on record.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Answer in JSON, a list of answers; with --why every view on record.")
+    ] = False,
 ) -> None:
     """Find the things that may be a LABEL, or answer a question about places.
 
     The likeliest or, with --near, the nearest come first, each with its probability and uncertainty. One question at a
     time; a LABEL with it leaves only answers that may be one.
+
+    In JSON, answer_probability is that of being what was asked for. Lengths are metres in the map's frame, covariances
+    square metres, stamps seconds, angles radians, boxes in images (xyxy) pixels, T_world_camera 4 x 4, shares of what
+    is visible from 0 to 1, log ratios nats.
     """
     from ...datasets.errors import UserError
     from ..map.object_map import ObjectMap
@@ -123,7 +131,7 @@ def _show(question: Question, answers: list[Any], object_map: ObjectMap, why: bo
         documents = [to_dict(answer) for answer in answers]
         for document, (_, explanation) in zip(documents, explained, strict=False):
             document["why"] = explanation.to_dict()
-        typer.echo(json.dumps(documents, indent=1, ensure_ascii=False))
+        typer.echo(json.dumps(documents, indent=1, ensure_ascii=False, allow_nan=False))
     elif explained:
         print_explained(explained)
     elif answers:
@@ -134,6 +142,7 @@ def _show(question: Question, answers: list[Any], object_map: ObjectMap, why: bo
 
 def _explanation(answer: Answer, question: Question, object_map: ObjectMap) -> Explanation:
     """Why the thing is what was asked for: of several labels that were meant, the one that it most probably is."""
-    labels = object_map.understand(question.label).labels if question.label else ()
+    named = question.label is None or object_map.called(question.label)
+    labels = () if named else object_map.understand(str(question.label)).labels
     thing = answer.thing
     return thing.explain(max(labels, key=thing.belief) if labels else None)

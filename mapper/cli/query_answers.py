@@ -49,7 +49,8 @@ def sighting_to_dict(sighting: Sighting | ExpectedDetection) -> dict[str, Any]:
         "answer_probability": sighting.probability,
         "share": sighting.share,
         "xyxy": np.asarray(sighting.xyxy).tolist(),
-        **({} if std is None else {"xyxy_std": np.asarray(std).tolist()}),
+        # of a thing that is not wholly in front of the camera nothing is known; JSON has no NaN
+        **({} if std is None else {"xyxy_std": [float(s) if np.isfinite(s) else None for s in std]}),
     }
 
 

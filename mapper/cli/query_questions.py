@@ -56,19 +56,20 @@ def question_of(
         asked: the options that were given, with their values.
         near: of --near.
         min_probability: of --min-probability.
-        object_map: a text that is a label or a name in it is no sentence.
+        object_map: a text that is a label, a name or an id in it is no sentence.
 
     Raises:
         UserError: none is asked, or several; a sentence is not understood, or --near does not go with the question.
     """
     if len(asked) > 1:
         raise UserError(f"{' and '.join(kind.value for kind in asked)} are different questions; ask one at a time")
-    if label is not None and not object_map.knows(label) and not object_map.index.named(label):
+    if label is not None and not object_map.knows(label) and not object_map.called(label):
         sentence = parse_sentence(label)
         if sentence is not None and not asked:
-            asked, label = {sentence.kind: sentence.subject}, sentence.label
+            subject = sentence.phrase if object_map.called(sentence.phrase) else sentence.subject
+            asked, label = {sentence.kind: subject}, sentence.label
             if sentence.kind is Kind.FIND:
-                asked, label = {}, sentence.subject
+                asked, label = {}, subject
         elif is_question(label):
             raise UserError(f"{label!r} is not understood; the questions are: {'  '.join(FORMS)}")
     if not asked and label is None:
@@ -82,12 +83,12 @@ def question_of(
 
 
 def remark(question: Question, object_map: ObjectMap) -> str | None:
-    """What to tell the user of how the words were understood; None where they are a label or a name.
+    """What to tell the user of how the words were understood; None where they are a label, a name or an id.
 
     Raises:
-        UserError: the map knows no such label.
+        UserError: the map knows no such label or thing.
     """
-    if question.label is None or object_map.index.named(question.label):
+    if question.label is None or object_map.called(question.label):
         return None
     object_map.labels_of(question.label)
     return None if object_map.knows(question.label) else str(object_map.understand(question.label))
@@ -107,12 +108,11 @@ def ask(question: Question, object_map: ObjectMap, out: Path) -> list[Any]:
     if kind is Kind.LAST_SEEN:
         return object_map.last_seen(subject, least)
     if kind is Kind.LOOK:
-        what = subject if any(thing.id == subject for thing in object_map.things) else _one_label(subject, object_map)
-        return object_map.where_to_look(what)
+        return object_map.where_to_look(subject)
     pose = pose_of(subject, out, kind.value)
     if kind is Kind.EXPECTED:
         return [seen for seen in object_map.expected_at(pose) if seen.probability >= least]
-    seen = object_map.visible_from(pose, label=None if label is None else _one_label(label, object_map))
+    seen = object_map.visible_from(pose, label=label)
     return [sighting for sighting in seen if sighting.probability >= least]
 
 
@@ -129,9 +129,3 @@ def nothing_found(question: Question, object_map: ObjectMap) -> str:
     if question.kind is Kind.LOOK:
         return f"no viewpoint tells more of {question.subject}: what can be known from here on is known"
     return f"no {what} {least} for {question.kind.value} among {count} things"
-
-
-def _one_label(text: str, object_map: ObjectMap) -> str:
-    """The label that a text means, for questions that take one; the likeliest in the map where it means several."""
-    labels = object_map.labels_of(text)
-    return max(labels, key=lambda label: sum(thing.belief(label) for thing in object_map.things))

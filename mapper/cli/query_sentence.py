@@ -40,12 +40,14 @@ class Sentence:
 
     Attributes:
         kind: of question.
-        subject: the X of the form, as it was written.
+        subject: the X of the form, as it was written but for an article.
+        phrase: the X with its article: "my mug" may be a name.
         label: words for what is asked for ("which cups are on X"); None for anything.
     """
 
     kind: Kind
     subject: str
+    phrase: str
     label: str | None = None
 
 
@@ -57,7 +59,7 @@ RELATIONS = {
 }
 STANDS = r"(?:standing|stand|stands|resting|rest|rests|lying|lie|lies|sitting|sit|sits)"
 ARE = r"(?:is|are)"
-THE = r"(?:the |an |a |my |your |our )?"
+THE = r"(?P<the>(?:the |an |a |my |your |our )?)"
 PATTERNS: tuple[tuple[str, Kind], ...] = (
     (rf"(?:when|where) (?:was|were) {THE}(?P<x>.+?) (?:last seen|seen last)", Kind.LAST_SEEN),
     (rf"where (?:should i|to|do i|must i) look for {THE}(?P<x>.+)", Kind.LOOK),
@@ -70,16 +72,17 @@ PATTERNS: tuple[tuple[str, Kind], ...] = (
         for kind, words in RELATIONS.items()
     ),
 )
+IS = re.compile(r"^\s*(what|where|which|when)'s ", re.IGNORECASE)
 QUESTION = re.compile(r"(?:what|which|where|when|who|whose|how|why|is|are|does|do|can)\b", re.IGNORECASE)
 
 
 def parse_sentence(text: str) -> Sentence | None:
     """What a sentence of one of the `FORMS`, or of their variants, asks; None where it has none of these forms."""
-    plain = " ".join(text.replace("'s ", " is ").split()).strip(" ?!.")
+    plain = " ".join(re.sub(IS, r"\1 is ", text).split()).strip(" ?!.")
     for pattern, kind in PATTERNS:
         found = re.fullmatch(pattern, plain, re.IGNORECASE)
         if found:
-            return Sentence(kind, found["x"], found.groupdict().get("label"))
+            return Sentence(kind, found["x"], found["the"] + found["x"], found.groupdict().get("label"))
     return None
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from .applied import AppliedEdits, Pending
 from .edit import Action, Edit
-from .effects import merged, moved, named, relabelled
+from .effects import merged, moved, named, relabelled, resized
 from .matching import mismatch
 from .standing import Standing
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..map.thing import Thing
     from .journal import Entry
 
-CHANGES = {Action.RELABEL: relabelled, Action.MOVE: moved, Action.NAME: named}
+CHANGES = {Action.RELABEL: relabelled, Action.MOVE: moved, Action.RESIZE: resized, Action.NAME: named}
 
 
 def apply_edits(object_map: ObjectMap, entries: Iterable[Entry]) -> ObjectMap:

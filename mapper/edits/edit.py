@@ -21,6 +21,7 @@ class Action(StrEnum):
     RELABEL = "relabel"
     DELETE = "delete"
     MOVE = "move"
+    RESIZE = "resize"
     MERGE = "merge"
     NAME = "name"
 
@@ -88,7 +89,9 @@ class Edit:
         why: in that person's words; may be empty.
         label: of a relabel.
         probability: P(label | it exists) that a relabel states.
-        position, std: (3,) metres each, of a move: the centre and its standard deviations along the map's axes.
+        position: (3,) metres, of a move: the centre.
+        size: (3,) metres, of a resize: full extents along the box's own axes.
+        std: (3,) metres: standard deviations, of `position` along the map's axes, or of `size`.
         name: that a name gives; empty to take it away.
     """
 
@@ -101,6 +104,7 @@ class Edit:
     label: str | None = None
     probability: float | None = None
     position: np.ndarray | None = None
+    size: np.ndarray | None = None
     std: np.ndarray | None = None
     name: str | None = None
 
@@ -116,9 +120,9 @@ class Edit:
             case Action.RELABEL:
                 return f"relabel {things} from {self.targets[0].label} to {self.label} (P {self.probability:g})"
             case Action.MOVE:
-                assert self.position is not None and self.std is not None
-                place = ", ".join(f"{p:.3f}±{s:.3f}" for p, s in zip(self.position, self.std, strict=True))
-                return f"move {things} to {place} m"
+                return f"move {things} to {_with_std(self.position, self.std)} m"
+            case Action.RESIZE:
+                return f"resize {things} to {_with_std(self.size, self.std)} m"
             case Action.NAME:
                 return f"name {things} {self.name!r}" if self.name else f"name {things} no more"
         return f"{self.action} {things}"
@@ -129,8 +133,9 @@ class Edit:
         for key in ("label", "probability", "name"):
             if getattr(self, key) is not None:
                 said[key] = getattr(self, key)
-        if self.position is not None and self.std is not None:
-            said |= {"position": self.position.tolist(), "std": self.std.tolist()}
+        for key in ("position", "size", "std"):
+            if getattr(self, key) is not None:
+                said[key] = getattr(self, key).tolist()
         return {
             "number": self.number,
             "action": self.action.value,
@@ -150,6 +155,8 @@ class Edit:
             said = {"label": record.name("label"), "probability": record.number("probability", 0.0)}
         elif action is Action.MOVE:
             said = {"position": record.vector("position"), "std": record.vector("std", 0.0)}
+        elif action is Action.RESIZE:
+            said = {"size": record.vector("size", 0.0), "std": record.vector("std", 0.0)}
         elif action is Action.NAME:
             said = {"name": record.text("name")}
         targets = tuple(Target.from_record(target) for target in record.records("targets"))
@@ -158,3 +165,8 @@ class Edit:
                 raise ValueError(f"{len(targets)} targets for {action}")
         texts = {name: record.text(name) for name in ("who", "when", "why")}
         return cls(number=record.count("number"), action=action, targets=targets, **texts, **said)
+
+
+def _with_std(values: np.ndarray | None, stds: np.ndarray | None) -> str:
+    assert values is not None and stds is not None
+    return ", ".join(f"{value:.3f}±{std:.3f}" for value, std in zip(values, stds, strict=True))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import getpass
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import StrEnum
@@ -18,10 +18,11 @@ from ..map.object_map import ObjectMap
 from ..map.thing import Thing
 from .applied import Pending
 from .apply import apply_edits
-from .defaults import MOVE_STD, SAID_PROBABILITY
+from .defaults import MOVE_STD, RESIZE_STD, SAID_PROBABILITY
 from .edit import Action, Edit, Target
 from .journal import Entry, Journal, Reversal, journal_path
 from .standing import Standing
+from .values import stds_of, text_of, vector_of
 
 
 class State(StrEnum):
@@ -58,7 +59,7 @@ class MapEditor:
         path = Path(path)
         self._file = path / FILE_NAME if path.is_dir() else path
         self._journal = Journal(journal_path(self._file))
-        self._who = _text("who", _login_name() if who is None else who)
+        self._who = text_of("who", _login_name() if who is None else who)
         self.load()
 
     def load(self) -> ObjectMap:
@@ -79,7 +80,7 @@ class MapEditor:
         """
         if not 0.5 <= probability < 1.0:
             raise UserError(f"probability {probability:g}: give one of at least 0.5 and below 1, such as 0.99")
-        said = {"label": _text("label", label), "probability": float(probability)}
+        said = {"label": text_of("label", label), "probability": float(probability)}
         return self._edit(Action.RELABEL, [thing], why, **said)
 
     def delete(self, thing: Thing | str, *, why: str = "") -> Edit:
@@ -95,11 +96,22 @@ class MapEditor:
         why: str = "",
     ) -> Edit:
         """Say where the centre of a thing is: (3,) metres, map frame, with std along the map's axes, metres."""
-        place = _vector("position", position)
-        stds = _vector("std", [std] * 3 if isinstance(std, int | float) else std)
-        if not np.all(stds > 0.0):
-            raise UserError(f"std {stds.tolist()}: give metres above 0; nothing is known exactly")
-        return self._edit(Action.MOVE, [thing], why, position=place, std=stds)
+        return self._edit(Action.MOVE, [thing], why, position=vector_of("position", position), std=stds_of(std))
+
+    def resize(
+        self,
+        thing: Thing | str,
+        size: Iterable[float],
+        std: float | Iterable[float] = RESIZE_STD,
+        *,
+        why: str = "",
+    ) -> Edit:
+        """Say how large a thing is: (3,) full extents along its box's own axes, the third the height, with their std,
+        metres."""
+        extents = vector_of("size", size)
+        if not np.all(extents > 0.0):
+            raise UserError(f"size {extents.tolist()}: give metres above 0")
+        return self._edit(Action.RESIZE, [thing], why, size=extents, std=stds_of(std))
 
     def merge(self, things: Iterable[Thing | str], *, why: str = "") -> Edit:
         """Say that several things are one. The first keeps its id; the others' ids become other names of it."""
@@ -112,6 +124,18 @@ class MapEditor:
     def undo(self, n: int = 1, *, why: str = "") -> Reversal:
         """Undo the last n edits that stand; raises `UserError` where there are not so many."""
         return self._reverse(True, n, why)
+
+    def undo_edit(self, number: int, *, why: str = "") -> Reversal:
+        """Undo the edit of this number in the journal and no other; raises `UserError` where it is none that stands."""
+
+        def make(entries: tuple[Entry, ...], own: int) -> Reversal:
+            if number not in {edit.number for edit in Standing.of(entries).edits}:
+                raise UserError(
+                    f"{self._journal.path}: no edit {number} that stands; `thingmap edit OUT log` lists them"
+                )
+            return Reversal(own, True, (number,), self._who, _now(), why.strip())
+
+        return self._journal.append(make)
 
     def redo(self, n: int = 1, *, why: str = "") -> Reversal:
         """Do the last n edits again that were undone, if nothing was edited since."""
@@ -147,7 +171,7 @@ class MapEditor:
             targets = tuple(Target.of(estimated.thing(one)) for one in ids)
             return Edit(number, action, targets, self._who, _now(), why.strip(), **said)
 
-        return self._append(make)
+        return self._journal.append(make)
 
     def _reverse(self, undone: bool, n: int, why: str) -> Reversal:
         def make(entries: tuple[Entry, ...], number: int) -> Reversal:
@@ -158,9 +182,6 @@ class MapEditor:
             numbers = tuple(edit.number for edit in reversed(candidates[-n:]))
             return Reversal(number, undone, numbers, self._who, _now(), why.strip())
 
-        return self._append(make)
-
-    def _append(self, make: Callable[[tuple[Entry, ...], int], Any]) -> Any:
         return self._journal.append(make)
 
 
@@ -170,23 +191,6 @@ def _check_free(object_map: ObjectMap, name: str, own: str) -> None:
     other = next((thing for thing in others if str(thing.name).casefold() == name.casefold()), None)
     if other is not None:
         raise UserError(f"name {name!r}: {other.id} has it already; choose another one, or take it away there first")
-
-
-def _text(name: str, value: str) -> str:
-    text = " ".join(value.split())
-    if not text:
-        raise UserError(f"{name} is empty; give one")
-    return text
-
-
-def _vector(name: str, value: Iterable[float]) -> np.ndarray:
-    try:
-        vector = np.array([float(x) for x in value])
-    except (TypeError, ValueError):
-        vector = np.empty(0)
-    if vector.shape != (3,) or not np.all(np.isfinite(vector)):
-        raise UserError(f"{name}: expected three finite numbers, metres, found {value!r}")
-    return vector
 
 
 def _login_name() -> str:

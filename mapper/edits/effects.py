@@ -34,6 +34,13 @@ def moved(thing: Thing, edit: Edit) -> Thing:
     return replace(thing, position=edit.position, position_covariance=covariance, edits=(*thing.edits, edit))
 
 
+def resized(thing: Thing, edit: Edit) -> Thing:
+    """The size is what the edit says, with the stated std along the box's own axes; the centre stays."""
+    assert edit.size is not None and edit.std is not None
+    said = {"size": edit.size, "size_std": edit.std, "volume": None}
+    return replace(thing, **said, edits=(*thing.edits, edit))
+
+
 def named(thing: Thing, edit: Edit) -> Thing:
     """The name is the edit's; nothing else changes."""
     return replace(thing, name=edit.name or None, edits=(*thing.edits, edit))
@@ -77,8 +84,7 @@ def merged(things: Sequence[Thing], edit: Edit) -> Thing:
         ),
         views=MergedViews.of(things),
         points=sum(known) if len(known) == len(points) else None,
-        points_size=None,
-        points_size_std=None,
+        volume=None,
         name=next((thing.name for thing in things if thing.name), None),
         edits=(*sorted((e for thing in things for e in thing.edits), key=lambda e: e.number), edit),
         appearance=MergedAppearance.of(things),

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from ...datasets.errors import InputError, UserError
 from ...datasets.json_record import JsonRecord
@@ -75,6 +75,7 @@ class Mapped:
 
 
 Entry = Edit | Reversal | Mapped
+Made = TypeVar("Made", Edit, Reversal, Mapped)
 
 
 def journal_path(map_file: Path) -> Path:
@@ -106,7 +107,7 @@ class Journal:
             raise InputError(self.path, "a journal of edits", error.strerror or str(error), REMEDY) from None
         return self._parse(content)
 
-    def append(self, make: Callable[[tuple[Entry, ...], int], Entry]) -> Entry:
+    def append(self, make: Callable[[tuple[Entry, ...], int], Made]) -> Made:
         """Add one entry; nobody else writes meanwhile.
 
         Args:

@@ -15,9 +15,9 @@ from ...datasets.stamps import nearest
 from ...factors.visibility import TOLERANCE_M
 from ..map.object_map import ObjectMap
 from ..map.store import OutputFolder
+from ..mapped_sequence import open_mapped_sequence
 from ..queries.depth_image import draw_points, empty_depth
 from ..queries.run_files import RunFiles
-from .run_sequence import open_mapped_sequence
 
 ROUNDING = 1e-5  # s; files of trajectories hold microseconds
 

@@ -77,6 +77,7 @@ def _about(object_map: ObjectMap, table: str) -> dict[str, str]:
 def _thing_fields(arrow: Any) -> list[Any]:
     number, vector = arrow.float64(), arrow.list_(arrow.float64(), 3)
     evidence = arrow.struct([(name, arrow.int64()) for name in ("supporting", "occluded", "contradicting")])
+    volume = arrow.struct([*((name, vector) for name in ("position", "size", "size_std")), ("yaw", number)])
     return [
         arrow.field("id", arrow.string(), nullable=False),
         arrow.field("label", arrow.string(), nullable=False),
@@ -94,8 +95,7 @@ def _thing_fields(arrow: Any) -> list[Any]:
         ("last_seen", number),  # s
         ("evidence", evidence),  # views
         ("points", arrow.int64()),  # of the labelled cloud; null where it is not labelled
-        ("points_size", vector),  # m; null where it agrees with size
-        ("points_size_std", vector),
+        ("volume", volume),  # what the graph had, where the points have told better; else null
     ]
 
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from ...datasets.errors import InputError
 from ..map.atomic import write_atomic
-from ..map.store import AGAIN, TRAJECTORY_HEADER, OutputFolder
+from ..map.store import AGAIN, OutputFolder
+from ..map.trajectory_file import HEADER
 from .rotations import quaternions
 
 
@@ -21,7 +22,7 @@ def export_tum(folder: OutputFolder, file: Path, *, keyframes: bool = False) -> 
     """Write lines `stamp tx ty tz qx qy qz qw`, of keyframes only where asked; returns the number of poses."""
     stamps, poses = read_poses(folder, keyframes)
     rows = np.column_stack([stamps, poses[:, :3, 3], quaternions(poses[:, :3, :3])])
-    _write(file, rows, ["%.9f"] * 8, TRAJECTORY_HEADER)
+    _write(file, rows, ["%.9f"] * 8, HEADER)
     return len(rows)
 
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ...datasets.errors import UserError
 from ...detectors.detections import Part
-from ..estimation.view_log import FAINT, Verdict, ViewNote
+from ..estimation.view_log import Verdict
 from .text import probability_text
-from .views_file import ThingViews
+
+if TYPE_CHECKING:
+    from ..edits.edit import Edit
 
 PART_NAMES = tuple(part.name.lower() for part in Part)
 NOT_INDEPENDENT = "each view by itself; views are not independent, ratios do not add up"
@@ -83,6 +83,9 @@ class Explanation:
         thing_id: whose.
         label: which.
         probability: P(it exists and is a `label`).
+        views_label: of which label the views speak: `label`, unless only a person said that; then the likeliest class
+            that was looked for.
+        edits: what people changed of the thing, the oldest first; no view says anything of that.
         views: strongest first or in time order, as asked for.
         totals: number of views by verdict, those that are only counted among them; every verdict is a key.
         left_out: how many views said nothing and are not among `views`.
@@ -91,6 +94,8 @@ class Explanation:
     thing_id: str
     label: str
     probability: float
+    views_label: str
+    edits: tuple[Edit, ...]
     views: tuple[ViewExplanation, ...]
     totals: Mapping[Verdict, int]
     left_out: int
@@ -114,11 +119,20 @@ class Explanation:
         return f"{sum(self.totals.values())} views: " + ", ".join(parts)
 
     def table(self, limit: int = LISTED, width: int = WIDTH) -> str:
-        """The first `limit` views, one a line of at most `width` columns where that can be, and what is not shown."""
-        lines = [f"{self.thing_id} as {self.label} ({probability_text(self.probability)})", self.summary()]
+        """What people said, and the first `limit` views, one a line of at most `width` columns where that can be, and
+        what is not shown."""
+        lines = [f"{self.thing_id} as {self.label} ({probability_text(self.probability)})"]
+        lines += [
+            f"{edit.who} said on {edit.when}: {edit}" + (f" ({edit.why})" if edit.why else "") for edit in self.edits
+        ]
+        if self.views_label != self.label:
+            lines.append(
+                f"no view was asked about {self.label}, which only people said; they speak of {self.views_label}"
+            )
+        lines.append(self.summary())
         shown, rest = self.views[:limit], self.views[limit:]
         if shown:
-            lines += _columns([_cells(view, self.label, width < NARROW) for view in shown])
+            lines += _columns([_cells(view, self.views_label, width < NARROW) for view in shown])
         if more := len(rest) + self.left_out:
             hidden = self.totals[Verdict.OCCLUDED] - sum(view.verdict is Verdict.OCCLUDED for view in shown)
             lines.append(f"and {more} more {'view' if more == 1 else 'views'}, {hidden} of them hidden")
@@ -130,68 +144,12 @@ class Explanation:
         """Plain JSON values."""
         return {
             "label": self.label,
+            "views_label": self.views_label,
+            "edits": [edit.to_dict() for edit in self.edits],
             "totals": {verdict.name.lower(): self.totals[verdict] for verdict in Verdict},
             "left_out": self.left_out,
             "views": [view.to_dict() for view in self.views],
         }
-
-
-def explain_views(
-    views: ThingViews, thing_id: str, label: str, probability: float, in_time_order: bool = False
-) -> Explanation:
-    """What the views of a thing said about a label.
-
-    Raises:
-        UserError: no class is named so, upper and lower case being the same.
-    """
-    names = [name.casefold() for name in views.classes]
-    if label.casefold() not in names:
-        known = ", ".join(views.classes[:30]) or "none"
-        raise UserError(f"{thing_id}: no class {label!r} was looked for in its views; choose one of: {known}")
-    column = names.index(label.casefold())
-    explained = [_explain_note(note, views.classes, column) for note in views.notes]
-    totals = {verdict: views.left_out.get(verdict, 0) for verdict in Verdict}
-    for note in views.notes:
-        totals[note.verdict] += 1
-    if not in_time_order:  # a stable sort: equally strong views stay in time order
-        explained.sort(key=lambda view: view.strength, reverse=True)
-    left_out = sum(views.left_out.values())
-    return Explanation(thing_id, views.classes[column], probability, tuple(explained), totals, left_out)
-
-
-def _explain_note(note: ViewNote, classes: tuple[str, ...], column: int) -> ViewExplanation:
-    return ViewExplanation(
-        keyframe=note.keyframe,
-        stamp=note.stamp,
-        frame=note.frame,
-        visible={name: float(share) for name, share in zip(PART_NAMES, note.visible, strict=True)},
-        score=float(note.score) if math.isfinite(note.score) else None,
-        template=PART_NAMES[note.part] if note.part >= 0 else None,
-        found_as=classes[note.class_id] if note.class_id >= 0 else None,
-        log_ratio=float(note.log_ratio[column]),
-        weight=float(note.weight),
-        verdict=note.verdict,
-        text=_sentence(note, classes, column),
-    )
-
-
-def _sentence(note: ViewNote, classes: tuple[str, ...], column: int) -> str:
-    says, ratio = REASONS[note.verdict][0], float(note.log_ratio[column])
-    seen = f"{100.0 * note.visible[Part.WHOLE]:.0f} % of it visible"
-    name = f" as {classes[note.class_id]}" if note.class_id >= 0 else ""
-    score = f" with a score of {probability_text(note.score)}" if math.isfinite(note.score) else ""
-    part = f" by its {PART_NAMES[note.part]}" if note.part > Part.WHOLE else ""
-    why = {
-        Verdict.SUPPORTED: f"found{name}{score}{part}, {seen}",
-        Verdict.OCCLUDED: f"hidden, {seen}",
-        Verdict.MISSED: f"not found although {seen}",
-        Verdict.SEEN_THROUGH: "the camera looked through its volume",
-        Verdict.UNCLEAR: f"not found, nor was that to be expected with {seen}",
-    }
-    # a thing that is found may be of another class, and depths may show the surface of what is not found
-    expected = {SUPPORTED: ratio > -FAINT, CONTRADICTED: ratio < FAINT, SAID_NOTHING: abs(ratio) < FAINT}[says]
-    side = "for" if ratio > 0.0 else "against"
-    return f"{says}: {why[note.verdict]}" + ("" if expected else f"; all in all it speaks {side} {classes[column]}")
 
 
 def _cells(view: ViewExplanation, label: str, narrow: bool) -> tuple[str, ...]:

@@ -128,7 +128,8 @@ class ObjectMap(PlaceQuestions, LastViewQuestions, SightQuestions):
         if gone is not None:
             why = f" ({gone.why})" if gone.why else ""
             raise UserError(
-                f"{wanted}: {gone.who} deleted it on {gone.when}{why}; `thingmap edit OUT undo` undoes that"
+                f"{wanted}: {gone.who} deleted it on {gone.when}{why}; undo that with "
+                f"`thingmap edit OUT undo {gone.number}`"
             )
         raise UserError(f"{wanted}: the map of {self.source} has no such thing; ask for one of its things")
 

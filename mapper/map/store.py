@@ -18,9 +18,10 @@ from .cloud_file import AGAIN, read_cloud, write_cloud, write_labels
 from .map_file import CLOUD_NAME
 from .map_file import FILE_NAME as MAP_FILE
 from .object_map import ObjectMap
+from .trajectory_file import read_trajectory, write_trajectory
 from .views_file import evidence_path
 
-TRAJECTORY_HEADER = "stamp tx ty tz qx qy qz qw: T_world_camera in seconds and metres"
+__all__ = ["AGAIN", "OutputFolder"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,13 +139,7 @@ class OutputFolder:
 
     def write_trajectory(self, stamps: np.ndarray, T_world_camera: np.ndarray) -> None:
         """(N,) seconds and (N, 4, 4) poses as TUM lines `stamp tx ty tz qx qy qz qw`."""
-        from scipy.spatial.transform import Rotation
-
-        poses = np.asarray(T_world_camera, dtype=np.float64).reshape(-1, 4, 4)
-        rows = np.column_stack([np.asarray(stamps, dtype=np.float64), poses[:, :3, 3], _quaternions(poses, Rotation)])
-        formats = ["%.6f"] + ["%.6f"] * 3 + ["%.8f"] * 4
-        with replacing(self.trajectory_file) as temporary:
-            np.savetxt(temporary, rows, fmt=formats, header=TRAJECTORY_HEADER)
+        write_trajectory(self.trajectory_file, stamps, T_world_camera)
 
     def write_cloud(self, points: np.ndarray, colors: np.ndarray) -> None:
         """(M, 3) metres and (M, 3) uint8 RGB as binary PLY."""
@@ -185,22 +180,8 @@ class OutputFolder:
         return ObjectMap.load(self.map_file, edits=edits)
 
     def read_trajectory(self) -> tuple[np.ndarray, np.ndarray]:
-        """(N,) stamps in seconds and (N, 4, 4) `T_world_camera`."""
-        from scipy.spatial.transform import Rotation
-
-        try:
-            lines = self.trajectory_file.read_text(encoding="utf-8").splitlines()
-            fields = [line.split() for line in lines if line.strip() and line[0] != "#"]
-            if wrong := [row for row in fields if len(row) != 8]:
-                raise ValueError(f"a line of {len(wrong[0])}")
-            rows = np.array(fields, dtype=np.float64).reshape(-1, 8)
-        except (OSError, ValueError) as error:
-            raise InputError(self.trajectory_file, "lines of 8 numbers", str(error), AGAIN) from None
-        poses = np.tile(np.eye(4), (len(rows), 1, 1))
-        if len(rows):
-            poses[:, :3, :3] = Rotation.from_quat(rows[:, 4:]).as_matrix()
-        poses[:, :3, 3] = rows[:, 1:4]
-        return rows[:, 0], poses
+        """(N,) stamps in seconds and (N, 4, 4) `T_world_camera`; raises `InputError` where there are none."""
+        return read_trajectory(self.trajectory_file)
 
     def read_cloud(self) -> tuple[np.ndarray, np.ndarray]:
         """(M, 3) float64 metres and (M, 3) uint8 RGB; raises `InputError` where the file is absent or damaged."""
@@ -221,8 +202,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, np.generic | np.ndarray):
         return _plain(value.tolist())
     return None if isinstance(value, float) and not np.isfinite(value) else value
-
-
-def _quaternions(poses: np.ndarray, rotation: Any) -> np.ndarray:
-    """(N, 4) x, y, z, w with w >= 0."""
-    return rotation.from_matrix(poses[:, :3, :3]).as_quat(canonical=True) if len(poses) else np.empty((0, 4))

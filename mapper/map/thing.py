@@ -5,21 +5,22 @@ from __future__ import annotations
 import operator
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...datasets.errors import UserError
 from .boxes import box_corners
-from .explanation import Explanation, explain_views
+from .explain import explain_thing
+from .explanation import Explanation
+from .thing_checks import POSTERIOR_TOLERANCE, check_covariance, finite, read_only
 from .views_file import StoredViews, ThingViews
+from .volume import Volume
 
 if TYPE_CHECKING:
     from ..edits.edit import Edit
     from ..edits.merged_views import MergedViews
     from .appearance import SomeAppearance
-
-POSTERIOR_TOLERANCE = 1e-4  # how far `probability` and `class_posterior[label]` may differ through rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,9 +60,8 @@ class Thing:
         evidence: counts of views.
         views: what each of them said, in memory or in the map's evidence file; None where nobody knows. See `explain`.
         points: of the labelled cloud that are its own; None where nobody knows. `ObjectMap.points` gives them.
-        points_size: (3,) full extents along the box's own axes, metres, that its points suggest where they disagree
-            with `size`; None where they agree, or nobody knows.
-        points_size_std: (3,) standard deviations of `points_size`, metres; None with it.
+        volume: what the graph had of its place and size, where its points have told better: then `position`, `size`,
+            `size_std` and `yaw` are what those tell. None elsewhere.
         name: that somebody gave this one; None without.
         edits: what people changed of it, the oldest first; the other values are what came of them.
         appearance: how it looks, in memory or in the map's file of embeddings; None where nobody knows. See
@@ -86,25 +86,30 @@ class Thing:
     evidence: Evidence
     views: ThingViews | StoredViews | MergedViews | None = field(default=None, repr=False)
     points: int | None = None
-    points_size: np.ndarray | None = None
-    points_size_std: np.ndarray | None = None
+    volume: Volume | None = None
     name: str | None = None
     edits: tuple[Edit, ...] = ()
     appearance: SomeAppearance | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         for name, shape in (("position", (3,)), ("position_covariance", (3, 3)), ("size", (3,)), ("size_std", (3,))):
-            object.__setattr__(self, name, _read_only(name, getattr(self, name), shape))
+            object.__setattr__(self, name, read_only(name, getattr(self, name), shape))
         for name in ("probability", "existence", "yaw", "first_seen", "last_seen"):
-            object.__setattr__(self, name, _finite(name, getattr(self, name)))
-        for name in ("points_size", "points_size_std"):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, _read_only(name, getattr(self, name), (3,)))
+            object.__setattr__(self, name, finite(name, getattr(self, name)))
         if self.points is not None:
             object.__setattr__(self, "points", operator.index(self.points))
-        posterior = {str(label): _finite(f"class_posterior[{label!r}]", p) for label, p in self.class_posterior.items()}
+        posterior = {str(label): finite(f"class_posterior[{label!r}]", p) for label, p in self.class_posterior.items()}
         object.__setattr__(self, "class_posterior", posterior)
         self._check()
+
+    @classmethod
+    def of_checked(cls, **values: Any) -> Thing:
+        """From the values of all fields, which were checked and made read-only already, as those of many things are at
+        once (`things_from_document`)."""
+        thing = object.__new__(cls)
+        for name, value in values.items():
+            object.__setattr__(thing, name, value)
+        return thing
 
     def _check(self) -> None:
         if not self.label:
@@ -120,17 +125,9 @@ class Thing:
             raise ValueError(f"probability {self.probability} must be class_posterior[{self.label!r}], which is {kept}")
         if min(self.size.tolist()) < 0.0 or min(self.size_std.tolist()) < 0.0:
             raise ValueError(f"size and size_std must not be negative, but got {self.size} and {self.size_std}")
-        self._check_points()
-        _check_covariance("position_covariance", self.position_covariance)
-
-    def _check_points(self) -> None:
-        size, std = self.points_size, self.points_size_std
         if self.points is not None and self.points < 0:
             raise ValueError(f"points must not be negative, but got {self.points}")
-        if (size is None) is not (std is None):
-            raise ValueError(f"points_size and points_size_std must come together, but got {size} and {std}")
-        if size is not None and std is not None and (np.any(size < 0.0) or np.any(std < 0.0)):
-            raise ValueError(f"points_size and points_size_std must not be negative, but got {size} and {std}")
+        check_covariance("position_covariance", self.position_covariance)
 
     @property
     def position_std(self) -> np.ndarray:
@@ -153,10 +150,11 @@ class Thing:
         return self.existence * sum(p for name, p in self.class_posterior.items() if name.casefold() == wanted)
 
     def explain(self, label: str | None = None, *, in_time_order: bool = False) -> Explanation:
-        """Why: what every view on record said for or against this thing being a `label`.
+        """Why: what every view on record said for or against this thing being a `label`, and what people said.
 
         Args:
-            label: any class of the map, upper and lower case being the same; the likeliest by default.
+            label: any class of the map, upper and lower case being the same; the likeliest by default. Of one that only
+                a person gave to this thing, the views are shown for the likeliest that was looked for.
             in_time_order: instead of the strongest view first.
 
         Raises:
@@ -165,45 +163,8 @@ class Thing:
         """
         if self.views is None:
             raise UserError(f"{self.id}: nothing is on record of its views; take it from a mapper or a run's map")
-        label = self.label if label is None else label
-        return explain_views(self.views.read(), self.id, label, self.belief(label), in_time_order)
+        return explain_thing(self, self.views.read(), self.label if label is None else label, in_time_order)
 
     def corners(self, R_world_upright: np.ndarray) -> np.ndarray:
         """(8, 3) corners of the box, metres, map frame; order and edges as in `boxes`."""
         return box_corners(self.position, self.size, self.yaw, R_world_upright)
-
-
-def _read_only(name: str, value: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    array = np.array(value, dtype=np.float64)
-    if array.shape != shape:
-        raise ValueError(f"{name} must have shape {shape}, but got {array.shape}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite, but got {array.tolist()}")
-    array.setflags(write=False)
-    return array
-
-
-def _finite(name: str, value: float) -> float:
-    number = float(value)
-    if not np.isfinite(number):
-        raise ValueError(f"{name} must be finite, but got {number}")
-    return number
-
-
-def _check_covariance(name: str, covariance: np.ndarray) -> None:
-    """Raise `ValueError` where (3, 3) is not symmetric or has a negative eigenvalue, up to rounding.
-
-    Most are found right by Sylvester's criterion on plain numbers: maps have 100,000 things, and NumPy's overhead for a
-    matrix of nine numbers is longer than all else that is done to read a thing.
-    """
-    (a, b, c), (d, e, f), (g, h, i) = covariance.tolist()
-    scale = max(map(abs, (a, b, c, d, e, f, g, h, i)))
-    slack = 1e-6 * scale
-    if max(abs(b - d), abs(c - g), abs(f - h)) > slack:
-        raise ValueError(f"{name} must be symmetric, but got {covariance.tolist()}")
-    a, e, i = a + slack, e + slack, i + slack
-    plane = a * e - b * d
-    if a > 0.0 and plane > 0.0 and a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0.0:
-        return
-    if np.linalg.eigvalsh(covariance)[0] < -slack:  # on the edge, or no covariance
-        raise ValueError(f"{name} must have no negative eigenvalue, but got {covariance.tolist()}")

@@ -9,23 +9,24 @@ which probabilities take a tenth; filling the R*Tree takes many times as long, a
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from bisect import bisect_right
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 
-from ..map.region import Ball, Box, probability_inside
+from ..map.region import Ball, Box
 from ..map.thing import Thing
 from .answer import Answer
 from .index_group import Asked
-from .inside_bounds import inside_bounds
+from .index_words import ThingWords
+from .inside import INTEGRAL_ERROR, inside_or_nan
 
 Labels = str | Sequence[str] | None  # one, several of which any will do, or things of any class
 KEPT_LABELS = 256  # questions for labels whose answers are kept
 KEPT_GROUPS = 32  # groups of things with their trees; one of 100,000 takes 10 MB
-AGREE = 1e-4  # bounds that are this close are an answer: integrals are within 0.002
-INTEGRAL_ERROR = 0.004  # twice what `probability_inside` is within
 FARTHEST = 40.0  # standard deviations beyond which a normal probability is 0 in double precision
+ROUNDING = 1e-9  # metres
 
 
 class ThingIndex:
@@ -37,17 +38,18 @@ class ThingIndex:
 
     def __init__(self, things: Sequence[Thing]) -> None:
         self._things = tuple(things)
+        self._words = ThingWords(self._things)
         self._ranked: dict[tuple[str, ...], tuple[Answer, ...]] = {}
         self._groups: dict[tuple[tuple[str, ...] | None, float], Asked] = {}
 
     def thing(self, thing_id: str) -> Thing | None:
         """The thing that has an id, None where there is none."""
-        row = self._row_of_id.get(thing_id)
+        row = self._words.row_of_id.get(thing_id)
         return None if row is None else self._things[row]
 
     def named(self, name: str) -> tuple[Thing, ...]:
         """Things that somebody gave this name; upper and lower case are the same, and so are runs of spaces."""
-        return tuple(self._things[row] for row in self._rows_by_name.get(_plain(name), ()))
+        return tuple(self._things[row] for row in self._words.rows_named(name))
 
     def names(self) -> tuple[str, ...]:
         """Every name that was given, as it was given."""
@@ -66,8 +68,6 @@ class ThingIndex:
         answers = self._ranked[key]
         if not min_probability > 0.0 or not answers or answers[-1].probability >= min_probability:
             return list(answers)
-        from bisect import bisect_right
-
         return list(answers[: bisect_right(answers, -min_probability, key=lambda answer: -answer.probability)])
 
     def _rank(self, labels: tuple[str, ...]) -> tuple[Answer, ...]:
@@ -113,19 +113,12 @@ class ThingIndex:
         places = self._places_within(region, asked, min_probability)
         if len(places) == 0:
             return []
-        probability, positions = asked.probability[places], asked.positions[places]
+        probability = asked.probability[places]
         covariances = self._covariances(asked.rows[places])
-        lower, upper = inside_bounds(region, positions, covariances)
-        answers = []
-        possible = (probability * upper >= min_probability - INTEGRAL_ERROR) & (upper > 0.0)
-        for k in np.flatnonzero(possible).tolist():
-            inside = float(lower[k] + upper[k]) / 2.0
-            if upper[k] - lower[k] > AGREE:
-                inside = probability_inside(region, positions[k], covariances[k])
-            p = float(probability[k]) * inside
-            if p >= min_probability and p > 0.0:
-                answers.append((self._things[int(asked.rows[places[k]])], p))
-        return answers
+        p = probability * inside_or_nan(region, asked.positions[places], covariances, min_probability / probability)
+        found = np.flatnonzero((p >= min_probability) & (p > 0.0))  # what is NaN is too improbable
+        rows = asked.rows[places[found]].tolist()
+        return [(self._things[row], inside) for row, inside in zip(rows, p[found].tolist(), strict=True)]
 
     def _places_within(self, region: Box | Ball, asked: Asked, min_probability: float) -> np.ndarray:
         """Places in `asked.rows` of all that may be inside with at least `min_probability`.
@@ -137,12 +130,11 @@ class ThingIndex:
         least = min_probability - INTEGRAL_ERROR
         sigmas = 0.0 if least >= 0.5 else FARTHEST if least <= 0.0 else min(float(-ndtri(least)), FARTHEST)
         low, high = _extent(region)
-        widest = sigmas * self._widest
-        places = asked.by_x[slice(*np.searchsorted(asked.x, (low[0] - widest - 1e-9, high[0] + widest + 1e-9)))]
-        for axis in (1, 2, 0) if sigmas else (1, 2):
-            margin = 1e-9 + (sigmas * self._stds[asked.rows[places], axis] if sigmas else 0.0)
-            value = asked.positions[places, axis]
-            places = places[(value >= low[axis] - margin) & (value <= high[axis] + margin)]
+        places = asked.in_box(low - sigmas * self._widest - ROUNDING, high + sigmas * self._widest + ROUNDING)
+        if sigmas:  # the widest of all may be far from here
+            margin = sigmas * self._stds[asked.rows[places]] + ROUNDING
+            position = asked.positions[places]
+            places = places[np.all((position >= low - margin) & (position <= high + margin), axis=1)]
         return places
 
     def _asked(self, label: Labels, min_probability: float) -> Asked:
@@ -153,9 +145,7 @@ class ThingIndex:
             rows, beliefs = self._beliefs(labels)
             enough = (beliefs >= min_probability) & (beliefs > 0.0)
             rows = rows[enough]
-            positions = self._positions[rows]
-            by_x = np.argsort(positions[:, 0], kind="stable")
-            asked = Asked(rows, beliefs[enough], positions, by_x, positions[by_x, 0])
+            asked = Asked.of(rows, beliefs[enough], self._positions[rows])
         self._groups[key] = asked  # at the end: the first one is the one that was not asked for longest
         if len(self._groups) > KEPT_GROUPS:
             del self._groups[next(iter(self._groups))]
@@ -169,33 +159,13 @@ class ThingIndex:
         """(M,) places of things that may be one of the labels, and the probability of each; of all, that they exist."""
         if labels is None:
             return np.arange(len(self._things)), self._existence
-        rows = sorted({row for label in labels for row in self._rows_by_label.get(label, ())})
+        rows = sorted({row for label in labels for row in self._words.rows_by_label.get(label, ())})
         things = (self._things[row] for row in rows)
         beliefs = [min(sum(map(thing.belief, labels)), thing.existence) for thing in things]
         return np.array(rows, dtype=np.int64), np.array(beliefs, dtype=np.float64)
 
     def _covariances(self, rows: np.ndarray) -> np.ndarray:
         return np.array([self._things[row].position_covariance for row in rows.tolist()]).reshape(-1, 3, 3)
-
-    @cached_property
-    def _row_of_id(self) -> dict[str, int]:
-        return {thing.id: row for row, thing in enumerate(self._things)}
-
-    @cached_property
-    def _rows_by_name(self) -> dict[str, list[int]]:
-        return _rows_by((row, _plain(thing.name)) for row, thing in enumerate(self._things) if thing.name)
-
-    @cached_property
-    def _rows_by_label(self) -> dict[str, list[int]]:
-        lower: dict[str, str] = {}
-        found: dict[str, list[int]] = {}
-        for row, thing in enumerate(self._things):
-            for name in thing.class_posterior:
-                key = lower.get(name) or lower.setdefault(name, name.casefold())
-                rows = found.setdefault(key, [])
-                if not rows or rows[-1] != row:  # "Cup" and "cup" are one label
-                    rows.append(row)
-        return found
 
     @cached_property
     def _existence(self) -> np.ndarray:
@@ -227,14 +197,3 @@ def _key(label: Labels) -> tuple[str, ...] | None:
     if label is None:
         return None
     return tuple(dict.fromkeys(one.casefold() for one in ([label] if isinstance(label, str) else label)))
-
-
-def _plain(name: str) -> str:
-    return " ".join(name.casefold().split())
-
-
-def _rows_by(pairs: Iterable[tuple[int, str]]) -> dict[str, list[int]]:
-    found: dict[str, list[int]] = {}
-    for row, key in pairs:
-        found.setdefault(key, []).append(row)
-    return found

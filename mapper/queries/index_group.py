@@ -18,15 +18,28 @@ class Asked:
         probability: (M,) of being that.
         positions: (M, 3) metres.
         by_x: (M,) order by the x coordinate.
-        x: (M,) sorted.
+        sorted: (3, M) metres: the positions in that order.
     """
 
     rows: np.ndarray
     probability: np.ndarray
     positions: np.ndarray
     by_x: np.ndarray
-    x: np.ndarray
+    sorted: np.ndarray
     _tree: list = field(default_factory=list, repr=False)
+
+    @classmethod
+    def of(cls, rows: np.ndarray, probability: np.ndarray, positions: np.ndarray) -> Asked:
+        """With the order made."""
+        by_x = np.argsort(positions[:, 0], kind="stable")
+        return cls(rows, probability, positions, by_x, np.ascontiguousarray(positions[by_x].T))
+
+    def in_box(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        """Places in `rows` of all whose position is in an axis-aligned box, (3,) metres each."""
+        first, end = np.searchsorted(self.sorted[0], (low[0], high[0]))
+        y, z = self.sorted[1:, first:end]
+        inside = (y >= low[1]) & (y <= high[1]) & (z >= low[2]) & (z <= high[2])
+        return self.by_x[first:end][inside]
 
     def near(self, origin: np.ndarray, count: int | None) -> np.ndarray:
         """Places in `rows` of all that are as near as the `count`-th nearest; every place where count is None."""

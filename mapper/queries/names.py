@@ -33,6 +33,30 @@ class NameQuestions(MapContent):
         """The labels of this map that `text` means, and how it was understood; see `match_labels`."""
         return match_labels(text, self.classes)
 
+    def called(self, text: str) -> tuple[Thing, ...]:
+        """Things that `text` means whatever they are: by id, or by the very name that somebody gave; none where it is a
+        label of the map, or nothing of that kind.
+
+        Raises:
+            UserError: it is written as an id is, and there is no such thing.
+        """
+        text = text.strip()
+        if self.knows(text):
+            return ()
+        own = self._by_id(text)
+        return self.index.named(text) if own is None else (own,)
+
+    def belief_of(self, text: str | None) -> Callable[[Thing], float]:
+        """P(a thing exists and is what `text` means) of things of this map: one that is called so, or one of the labels
+        that are understood; None for anything. Raises `UserError` as `called`."""
+        if text is None:
+            return lambda thing: thing.existence
+        called = {thing.id for thing in self.called(text)}
+        if called:
+            return lambda thing: thing.existence if thing.id in called else 0.0
+        labels = self.understand(text).labels
+        return lambda thing: belief_in(thing, labels)
+
     def find(
         self,
         text: str,
@@ -43,13 +67,13 @@ class NameQuestions(MapContent):
     ) -> list[Answer]:
         """Things that `text` may mean, likeliest first.
 
-        A given name means the thing that has it, ranked by its existence. Any other text is understood as labels
-        (`understand`), and things are ranked by existence times the probability of *those* labels in their own
+        An id or a given name means the thing that has it, ranked by its existence. Any other text is understood as
+        labels (`understand`), and things are ranked by existence times the probability of *those* labels in their own
         posterior, so a thing that is likelier a bowl is still found as a cup. Things that cannot be one are left out;
         a text that is not understood gives an empty list.
 
         Args:
-            text: a label, a synonym, words that hold one, or the name given to a thing.
+            text: a label, a synonym, words that hold one, the name given to a thing, or an id.
             min_probability: of an answer.
             encoder: turns a text into an embedding (D,) of the space of the things' own. With one, things are ranked by
                 how alike the embeddings are, labels and names play no part; see `find_by_embedding` for what the
@@ -57,14 +81,16 @@ class NameQuestions(MapContent):
             temperature: of that ranking.
 
         Raises:
-            UserError: with `encoder`, no thing has an embedding, or they are of other lengths.
+            UserError: `text` is written as an id is, and there is no such thing; with `encoder`, no thing has an
+                embedding, or they are of other lengths.
         """
         if encoder is not None:
             answers = find_by_embedding(self.things, text, encoder, temperature)
         else:
-            answers = self._named(text)
-            if not answers:
+            called = self.called(text)
+            if not called:
                 return self.index.ranked(self.understand(text).labels, min_probability)
+            answers = [Answer(thing, thing.existence) for thing in called]
         answers = [answer for answer in answers if answer.probability >= min_probability and answer.probability > 0.0]
         return sorted(answers, key=lambda answer: (-answer.probability, answer.thing.id))
 
@@ -74,14 +100,8 @@ class NameQuestions(MapContent):
 
     def _by_id(self, which: Thing | str) -> Thing | None:
         """The thing that is meant where `which` is one or is written as an id is, else None; `UserError` as `thing`."""
-        is_id = isinstance(which, Thing) or ID.fullmatch(which) or any(thing.id == which for thing in self.things)
+        is_id = isinstance(which, Thing) or ID.fullmatch(which) or self.index.thing(which) is not None
         return self.thing(which) if is_id else None
-
-    def _named(self, text: str) -> list[Answer]:
-        """Things to which somebody has given this very name, unless a class has it too."""
-        if self.knows(text.strip()):
-            return []
-        return [Answer(thing, thing.existence) for thing in self.index.named(text)]
 
     def labels_of(self, text: str) -> tuple[str, ...]:
         """The labels that a text means; raises `UserError` with a guess and the list of labels where there are none."""

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..map.region import Polygon, as_region, probability_inside
+from ..map.region import Polygon, Region, as_region, probability_inside
 from ..map.thing import Thing
 from .answer import PROBABLE, Answer
 from .names import NameQuestions
@@ -28,15 +28,17 @@ class PlaceQuestions(NameQuestions):
 
         Args:
             point: where to measure from.
-            label: only things that are one with at least `min_probability`, in words as for `find`; None for things of
-                any class, by existence.
+            label: only things that are one with at least `min_probability`, in words as for `find`, or the one that has
+                this name; None for things of any class, by existence.
             count: how many; None for all.
             min_probability: of being what was asked for.
         """
         origin = np.asarray(point, dtype=np.float64)
         if origin.shape != (3,) or not np.all(np.isfinite(origin)):
             raise ValueError(f"point must be three finite numbers, but got {point!r}")
-        near = self.index.near(origin, self._labels(label), count, min_probability)
+        near = self._called(label, min_probability)
+        if near is None:
+            near = self.index.near(origin, self._labels(label), count, min_probability)
         answers = [Answer(thing, probability, *_distance(origin, thing)) for thing, probability in near]
         return sorted(answers, key=lambda answer: (answer.distance, answer.thing.id))[:count]
 
@@ -52,8 +54,12 @@ class PlaceQuestions(NameQuestions):
             min_probability: of existing, being a `label` and having its centre inside, all three.
         """
         where = as_region(region)
-        if isinstance(where, Polygon):
-            inside = self._inside(where, label, min_probability)
+        called = self._called(label, min_probability)
+        if called is not None:
+            inside = self._inside(where, called, min_probability)
+        elif isinstance(where, Polygon):
+            probable = self.index.probable(self._labels(label), min_probability)
+            inside = self._inside(where, probable, min_probability)
         else:
             inside = self.index.within(where, self._labels(label), min_probability)
         answers = [Answer(thing, probability) for thing, probability in inside]
@@ -63,10 +69,18 @@ class PlaceQuestions(NameQuestions):
         """What the index is asked for; None for things of any class."""
         return None if text is None else self.understand(text).labels
 
-    def _inside(self, region: Polygon, label: str | None, min_probability: float) -> list[tuple[Thing, float]]:
-        R = self.R_world_upright
+    def _called(self, text: str | None, min_probability: float) -> list[tuple[Thing, float]] | None:
+        """Things that are called so and exist with at least this probability; None where nothing is called so."""
+        called = () if text is None else self.called(text)
+        return [(thing, thing.existence) for thing in called if thing.existence >= min_probability] if called else None
+
+    def _inside(
+        self, region: Region, things: list[tuple[Thing, float]], min_probability: float
+    ) -> list[tuple[Thing, float]]:
+        """Those of the things, each with P(it is what was asked for), that are inside too, with P(both)."""
+        R = self.R_world_upright if isinstance(region, Polygon) else np.eye(3)
         found = []
-        for thing, probability in self.index.probable(self._labels(label), min_probability):
+        for thing, probability in things:
             p = probability * probability_inside(region, R.T @ thing.position, R.T @ thing.position_covariance @ R)
             if p >= min_probability and p > 0.0:
                 found.append((thing, p))

@@ -9,7 +9,7 @@ import numpy as np
 from ...datasets.errors import UserError
 from ..map.thing import Thing
 from .answer import PROBABLE, Answer
-from .names import NameQuestions, belief_in
+from .names import NameQuestions
 from .relation_boxes import Pairs, UprightBoxes, upright_boxes
 from .relation_candidates import Near, candidate_pairs
 from .relation_places import gaps, is_beside, is_inside, is_under
@@ -29,7 +29,8 @@ class RelationQuestions(NameQuestions):
 
     Every question takes:
         which: the other thing.
-        label: words for a class: only answers that are one, as probably as they are; None for things of any class.
+        label: words for a class, as in `find`: only answers that are one, as probably as they are; or the name of the
+            one thing that may be the answer; None for anything.
         min_probability: of an answer.
     and raises `UserError` where the map has no such thing as `which`, or does not know `label`.
     """
@@ -85,12 +86,14 @@ class RelationQuestions(NameQuestions):
         meant = self._meant(which)
         found = relation(boxes, np.array(sorted(meant), dtype=np.intp))
         share = np.array([meant[int(b)] for b in found.second])
-        classes = None if label is None else self.labels_of(label)
+        if label is not None and not self.called(label):
+            self.labels_of(label)  # words that mean nothing are a mistake
+        belief = self.belief_of(label)
         probability = _of_any(found, share, len(boxes), exclusive=relation is _carried)
         answers = []
         for i in np.flatnonzero(probability > 0.0):
             thing = self.things[i]
-            p = float(probability[i]) * (1.0 if classes is None else belief_in(thing, classes) / thing.existence)
+            p = float(probability[i]) * belief(thing) / thing.existence
             if p >= min_probability and p > 0.0:
                 answers.append(Answer(thing, p, *(_gap(boxes, found, int(i)) if with_gaps else (None, None))))
         return sorted(answers, key=lambda answer: (-answer.probability, answer.thing.id))

@@ -40,7 +40,8 @@ class SightQuestions(NameQuestions):
         Args:
             T_world_camera: (4, 4) where the camera is.
             camera: that looks; the one that mapped, if not given.
-            label: only things that may be one, in words as for `find`; None for things of any class.
+            label: only things that may be one, in words as for `find`, or the one that has this name; None for things
+                of any class.
             min_share: of a thing that must be in the image and not hidden for it to count as seen, in (0, 1].
 
         Raises:
@@ -52,8 +53,7 @@ class SightQuestions(NameQuestions):
             raise ValueError(f"min_share must be above 0 and at most 1, but got {min_share}")
         from .sightings import sightings
 
-        labels = None if label is None else self.understand(label).labels
-        return sightings(self, _pose(T_world_camera), self._camera_or(camera), labels, min_share)
+        return sightings(self, _pose(T_world_camera), self._camera_or(camera), self.belief_of(label), min_share)
 
     def expected_at(self, T_world_camera: np.ndarray, camera: Intrinsics | None = None) -> list[ExpectedDetection]:
         """What the map's detector should find from a place, likeliest first, each with its box in the image:
@@ -111,9 +111,7 @@ class SightQuestions(NameQuestions):
             raise ValueError(f"count must be at least 1, but got {count}")
         from .next_views import next_views
 
-        subject = self._by_id(what)
-        if subject is None and isinstance(what, str):
-            subject = next((answer.thing for answer in self._named(what)), None)
+        subject = self.thing(what) if isinstance(what, Thing) else next(iter(self.called(what)), None)
         labels = self.labels_of(str(what)) if subject is None else None
         poses = None if candidates is None else np.array([_pose(T) for T in candidates]).reshape(-1, 4, 4)
         return next_views(self, subject, labels, count, self._camera_or(camera), poses)

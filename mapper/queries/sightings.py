@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,7 +11,6 @@ import numpy as np
 from ...datasets.frame import Intrinsics
 from ..map.thing import Thing
 from .map_content import MapContent
-from .names import belief_in
 from .run_files import RunFiles, class_posteriors
 from .seen_volumes import Occluders, Volumes, box_sides, box_std, sampled_visibility
 
@@ -62,14 +61,17 @@ class _Shown(NamedTuple):
 
 
 def sightings(
-    content: MapContent, T_world_camera: np.ndarray, camera: Intrinsics, labels: Sequence[str] | None, min_share: float
+    content: MapContent,
+    T_world_camera: np.ndarray,
+    camera: Intrinsics,
+    belief: Callable[[Thing], float],
+    min_share: float,
 ) -> list[Sighting]:
-    """See `SightQuestions.visible_from`."""
+    """See `SightQuestions.visible_from`; `belief` is P(a thing exists and is what was asked for)."""
     answers = []
     for number, xyxy, shares in _things_in_view(content, RunFiles(content), T_world_camera, camera):
         thing = content.things[number]
-        asked = thing.existence if labels is None else belief_in(thing, labels)
-        probability = asked * float(np.mean(shares >= min_share))
+        probability = belief(thing) * float(np.mean(shares >= min_share))
         if probability > 0.0:
             answers.append(Sighting(thing, probability, float(shares.mean()), xyxy))
     return sorted(answers, key=lambda answer: (-answer.probability, answer.thing.id))

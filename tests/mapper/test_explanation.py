@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 from thingmap.datasets.errors import InputError, UserError
+from thingmap.mapper.edits.edit import Action, Edit, Target
+from thingmap.mapper.edits.effects import relabelled
 from thingmap.mapper.estimation.view_log import Verdict, ViewNote
 from thingmap.mapper.map.object_map import ObjectMap
 from thingmap.mapper.map.store import OutputFolder
@@ -281,3 +283,41 @@ def test_a_map_that_names_no_file_properly_is_refused(seen, tmp_path):
         file.write_text(json.dumps({**document, "evidence": named}))
         with pytest.raises(InputError, match="evidence"):
             ObjectMap.load(file)
+
+
+class TestWhatPeopleSaid:
+    """A thing that a person gave a label."""
+
+    @pytest.fixture
+    def edited(self, make_thing, views):
+        def edit(label: str, why: str = ""):
+            thing = make_thing(1, "cup", 0.9, views=views)
+            change = Edit(3, Action.RELABEL, (Target.of(thing),), "ann", "2026-03-01T09:30:00Z", why, label, 0.99)
+            return relabelled(thing, change)
+
+        return edit
+
+    def test_a_label_that_no_view_was_asked_about(self, edited):
+        explanation = edited("mug", "it has a handle").explain()
+        assert (explanation.label, explanation.views_label) == ("mug", "cup")
+        assert explanation.probability == edited("mug").belief("mug") > 0.9
+        same = edited("mug").explain("CUP")
+        assert [view.to_dict() for view in explanation] == [view.to_dict() for view in same] and len(explanation) > 0
+        lines = str(explanation).splitlines()
+        assert lines[0].startswith("thing-0001 as mug (0.9")
+        assert lines[1] == (
+            "ann said on 2026-03-01T09:30:00Z: relabel thing-0001 from cup to mug (P 0.99) (it has a handle)"
+        )
+        assert lines[2] == "no view was asked about mug, which only people said; they speak of cup"
+        assert "supported as cup" not in str(explanation)  # that is what they were asked
+        values = json.loads(json.dumps(explanation.to_dict()))
+        assert (values["label"], values["views_label"], values["edits"][0]["who"]) == ("mug", "cup", "ann")
+
+    def test_a_label_that_views_know_too(self, edited):
+        explanation = edited("bowl").explain()
+        assert explanation.views_label == explanation.label == "bowl" and "ann said on" in str(explanation)
+        assert "no view was asked" not in str(explanation)
+
+    def test_a_label_that_nobody_said(self, edited):
+        with pytest.raises(UserError, match="no class 'zebra' was looked for"):
+            edited("mug").explain("zebra")

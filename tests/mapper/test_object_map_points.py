@@ -14,6 +14,7 @@ from thingmap.mapper.map.object_map import MapFrame, ObjectMap
 from thingmap.mapper.map.store import OutputFolder
 from thingmap.mapper.map.thing import Evidence, Thing
 from thingmap.mapper.map.up_direction import UpDirection
+from thingmap.mapper.map.volume import Volume
 
 POINTS = np.array([[0.0, 0.0, 0.25], [1.0, 0.5, 0.0], [0.5, 0.0, 0.0], [2.0, 0.0, 0.0], [0.25, 0.0, 0.125]])
 LABELS = np.array([0, 1, 0, NO_OBJECT, 0])
@@ -84,8 +85,8 @@ def test_a_thing_has_its_points(out):
 
 
 def test_a_map_keeps_what_labelling_wrote(out):
-    size = {"points_size": [0.2, 0.1, 0.1], "points_size_std": [0.03, 0.01, 0.01]}
-    change_things(out, lambda n, thing: thing | (size if n == 1 else {}))
+    volume = {"position": [0.5, 0.0, 0.1], "size": [0.2, 0.1, 0.1], "size_std": [0.03, 0.01, 0.01], "yaw": 0.3}
+    change_things(out, lambda n, thing: thing | ({"volume": volume} if n == 1 else {}))
     object_map = ObjectMap.load(out)
     before = json.loads((out / "map.json").read_text())
     object_map.save(out / "map.json")
@@ -93,7 +94,10 @@ def test_a_map_keeps_what_labelling_wrote(out):
     assert after == before and list(after)[-1] == "things"
     again = ObjectMap.load(out)
     assert again.labels is not None and dict(again.labels.points) == COUNTS
-    assert again.things[1].points_size.tolist() == size["points_size"] and again.things[0].points_size is None
+    assert again.things[1].volume.to_dict() == volume and again.things[0].volume is None
+    before_labelling = again.things[1].volume.of(again.things[1])
+    assert before_labelling.size.tolist() == volume["size"] and before_labelling.yaw == 0.3
+    assert before_labelling.volume is None
     assert len(again.points("thing-0007")) == 2
 
 
@@ -157,9 +161,10 @@ def test_mistakes_in_the_map_are_named(out, labels):
     [
         {"points": -1},
         {"points": 1.5},
-        {"points_size": [0.1, 0.1]},
-        {"points_size": [0.1] * 3},
-        {"points_size": [-0.1] * 3, "points_size_std": [0.1] * 3},
+        {"volume": 3},
+        {"volume": {"position": [0.0] * 3, "size": [0.1] * 3, "size_std": [0.1] * 3}},
+        {"volume": {"position": [0.0] * 3, "size": [0.1] * 2, "size_std": [0.1] * 3, "yaw": 0.0}},
+        {"volume": {"position": [0.0] * 3, "size": [-0.1] * 3, "size_std": [0.1] * 3, "yaw": 0.0}},
     ],
 )
 def test_mistakes_in_things_are_named(out, values):
@@ -168,7 +173,12 @@ def test_mistakes_in_things_are_named(out, values):
         ObjectMap.load(out)
 
 
-@pytest.mark.parametrize("wrong", [{"points": -1}, {"points_size": np.ones(3)}, {"points_size_std": np.ones(3)}])
-def test_a_thing_checks_them(wrong):
+def test_a_thing_checks_its_points():
     with pytest.raises(ValueError, match="points"):
-        make_thing(1, **wrong)
+        make_thing(1, points=-1)
+
+
+@pytest.mark.parametrize("wrong", [{"size": np.ones(2)}, {"size_std": -np.ones(3)}, {"yaw": np.nan}])
+def test_a_volume_checks_its_values(wrong):
+    with pytest.raises(ValueError, match=r"size|yaw"):
+        Volume(**({"position": np.zeros(3), "size": np.ones(3), "size_std": np.ones(3), "yaw": 0.0} | wrong))

@@ -48,7 +48,7 @@ class Panel {
     const head = (...names) => make("thead", { children: [make("tr", { children: ["", ...names].map((text) => make("th", { text, scope: "col" })) })] });
     const positions = make("table", { className: "numbers", children: [head("x", "y", "z"), line("cm", ...cells(thing.position, thing.position_std, cm))] });
     const sizes = [line("cm", ...cells(thing.size, thing.size_std, cm))];
-    if (thing.points_size) sizes.push(line("points say", ...cells(thing.points_size, thing.points_size_std, cm)));
+    if (thing.volume_size) sizes.push(line("boxes alone", ...cells(thing.volume_size, thing.volume_size_std, cm)));
     const turned = `turned ${((180 * thing.yaw) / Math.PI).toFixed(0)}° about up`;
     const points = thing.points === undefined ? "" : ` · ${thing.points.toLocaleString("en")} labelled points`;
     return [

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ....datasets.errors import UserError
 from ....datasets.frame import BrokenFrame, Frame
-from ....datasets.open import open_sequence
 from ....datasets.sequence import Sequence
 from ....datasets.stamps import nearest
 from ...map.store import OutputFolder
+from ...mapped_sequence import mapped_command, open_mapped_sequence
 from .cameras import SAME
 
 
@@ -56,14 +54,12 @@ def images_of(folder: OutputFolder, sequence: Sequence | str | None, run_stamps:
         UserError: a sequence was given and cannot be opened, or is another one. One that only the report names may be
             gone: then the page says so.
     """
-    asked = _asked(folder)
-    name: Sequence | str | None = sequence if sequence is not None else asked.get("sequence")
-    if name is None:
+    if sequence is None and mapped_command(folder).get("sequence") is None:
         return Images(None, "The run's report does not say what was mapped; give it with --sequence.")
     try:
-        dataset = asked.get("dataset") if sequence is None else None
-        how = asked.get("stride") or 1, asked.get("max_frames")
-        opened = open_sequence(name, dataset, *how) if isinstance(name, str) else name
+        opened = sequence
+        if opened is None or isinstance(opened, str):
+            opened = open_mapped_sequence(folder, opened)
         if problem := _unfit(opened, run_stamps):
             raise UserError(f"{folder.path}: {problem}; give the sequence that was mapped")
     except UserError as error:
@@ -79,12 +75,3 @@ def _unfit(sequence: Sequence, run_stamps: np.ndarray) -> str:
     found = nearest(run_stamps, np.sort(np.asarray(sequence.stamps)), SAME)
     missing = int(np.sum(found < 0))
     return f"{missing} of its {len(found)} mapped frames are not in {sequence.name}, by their stamps" if missing else ""
-
-
-def _asked(folder: OutputFolder) -> Mapping[str, Any]:
-    """What `thingmap run` was asked for, as far as the report says."""
-    if not folder.report_file.is_file():
-        return {}
-    report = folder.read_report()
-    command = report.get("command") if isinstance(report, dict) else None
-    return command if isinstance(command, dict) else {}

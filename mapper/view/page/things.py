@@ -39,8 +39,8 @@ def thing_values(thing: Thing, R_world_upright: np.ndarray, explanation: Explana
     }
     if thing.points is not None:
         values["points"] = thing.points
-    if thing.points_size is not None and thing.points_size_std is not None:
-        values |= {"points_size": _list(thing.points_size), "points_size_std": _list(thing.points_size_std)}
+    if thing.volume is not None:
+        values |= {"volume_size": _list(thing.volume.size), "volume_size_std": _list(thing.volume.size_std)}
     if thing.name:
         values["name"] = thing.name
     if thing.edits:

@@ -113,5 +113,5 @@ def test_labelling_says_which_things_have_points(labelled):
     assert having > 3 and f"{having} of {len(things)} things have points" in said
     object_map = ObjectMap.load(out)
     assert [len(object_map.points(thing)) for thing in object_map.things] == [thing["points"] for thing in things]
-    doubted = [thing for thing in things if "points_size" in thing]
-    assert (f"{len(doubted)} are of another size" in said) == bool(doubted)
+    told = sum("volume" in thing for thing in things)
+    assert (f"{told} have their place and size from their points" in said) == bool(told)

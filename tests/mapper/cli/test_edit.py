@@ -43,9 +43,25 @@ def test_every_edit_is_done_and_told(out, edit):
     assert edit("redo", "--who", "Ann").exit_code == 0 and len(ObjectMap.load(out)) == 1
 
 
+def test_a_size_and_an_edit_of_long_ago(out, edit):
+    assert edit("resize", "thing-0003", "--to", 0.1, 0.2, 0.3).stdout == (
+        "1: resize thing-0003 to 0.100±0.010, 0.200±0.010, 0.300±0.010 m\n"
+    )
+    edit("delete", "thing-0002"), edit("name", "thing-0001", "my mug")
+    assert ObjectMap.load(out).thing("thing-0003").size.tolist() == [0.1, 0.2, 0.3]
+    assert edit("undo", 2).stdout == "4: undo of 2\n"
+    object_map = ObjectMap.load(out)
+    assert object_map.thing("thing-0002") and object_map.thing("thing-0001").name == "my mug"
+    assert edit("undo", 1).exit_code == 0 and ObjectMap.load(out).thing("thing-0003").edits == ()
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (("undo", 7), "no edit 7 that stands"),
+        (("undo", 1, "-n", 2), "give the NUMBER of one edit"),
+        (("resize", "thing-0001", "--to", 0.1, 0, 0.1), "above 0"),
+        (("resize", "thing-0001", "--to", 0.1, 0.1, 0.1, "--std", 0), "nothing is known exactly"),
         (("relabel", "thing-0009", "mug"), "no such thing"),
         (("undo",), "0 edits to undo"),
         (("merge", "thing-0001"), "at least two things"),

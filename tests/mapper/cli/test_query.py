@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from thingmap.mapper.cli.main import app
 from thingmap.mapper.cli.query_sentence import FORMS, Kind, parse_sentence
+from thingmap.mapper.edits.editor import MapEditor
 from thingmap.mapper.map.store import OutputFolder
 from thingmap.mapper.map.up_direction import UpDirection
 
@@ -79,6 +80,33 @@ def test_questions(ask, arguments, expected):
     assert sorted(ids(ask(*arguments, "--json", "--min-probability", "0.3"))) == expected
 
 
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["my mug"], ["thing-0004"]),  # somebody calls a bottle so
+        (["where is my mug?"], ["thing-0004"]),
+        (["where is the mug?"], ["thing-0002"]),
+        (["where is MY  MUG"], ["thing-0004"]),
+        (["when was my mug last seen?"], ["thing-0004"]),
+        (["thing-0003"], ["thing-0003"]),
+        (["where is thing-0003?"], ["thing-0003"]),
+        (["my mug", "--near", "0", "0", "0"], ["thing-0004"]),
+        (["my mug", "--within-ball", "3", "1", "0", "0.3"], ["thing-0004"]),
+        (["my mug", "--within-ball", "0", "0", "0", "0.3"], []),
+        (["my mug", "--within-polygon", "2,0 4,0 4,2 2,2"], ["thing-0004"]),
+        (["my mug", "--on", "table"], []),
+        (["thing-0002", "--on", "table"], ["thing-0002"]),
+        (["where is Tom's book?"], ["thing-0003"]),
+        (["what does Tom's book stand on?"], ["thing-0001"]),
+    ],
+)
+def test_names_and_ids(ask, tmp_path, arguments, expected):
+    editor = MapEditor(tmp_path / "out", "ann")
+    editor.name("thing-0004", "my mug")
+    editor.name("thing-0003", "Tom's book")
+    assert ids(ask(*arguments, "--json", "--min-probability", "0.3")) == expected
+
+
 def test_tables_are_for_people(ask):
     shown = ask("--on", "table").stdout
     assert "P(asked for)" in shown and shown.index("thing-0002") > 0 and "thing-0004" not in shown
@@ -112,6 +140,8 @@ def test_how_words_were_taken_is_said_beside_the_answer(ask):
         (["mug", "--last-seen", "book"], "takes no LABEL"),
         (["--last-seen", "mug", "--why"], "--why"),
         (["what colour is the mug?"], "where is X?"),
+        (["thing-0077"], "no such thing"),
+        (["--where-to-look", "thing-0077"], "no such thing"),
         (["--visible-from", "up there"], "tx ty tz qx qy qz qw"),
         (["--expected-at", "77"], "no pose at 77 s; its stamps go from 0.000 to 0.100"),
         (["--visible-from", "0 0 0 0 0 0 1"], "does not know its camera"),
