@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,7 +14,6 @@ from .sources import DatasetOption, choose_detector, skipped_line
 from .stages import StageProgress
 
 if TYPE_CHECKING:
-    from ...datasets.sequence import Sequence
     from ..labelling.instances import Instances, ThingPoints
     from ..labelling.label_run import LabelReport
     from ..labelling.labelling_config import LabellingConfig
@@ -64,13 +63,13 @@ def label(
     from ...detectors.spec import make_detector
     from ..labelling.label_run import LabelJob
     from ..map.store import OutputFolder
+    from ..mapped_sequence import mapped_command, open_mapped_sequence
 
     source = OutputFolder.open(folder)
     settings = _settings(config, smoothness, fast, stride, volumes, bound)
-    asked = _asked(source)
-    name = sequence or asked.get("sequence")
-    frames = _open(source, name, dataset or (None if sequence else asked.get("dataset")), asked)
-    spec = choose_detector(detector or asked.get("detector"), str(name), frames)
+    asked = mapped_command(source)
+    frames = open_mapped_sequence(source, sequence, dataset)
+    spec = choose_detector(detector or asked.get("detector"), str(sequence or asked.get("sequence")), frames)
     job = LabelJob(source, frames, make_detector(spec, frames), f"{frames.name}, {spec}", settings, again)
     with stop_on_interrupt() as should_stop, StageProgress() as progress:
         report = job.execute(lambda done, total: progress.show("looking at frames", done, total), should_stop)
@@ -106,30 +105,6 @@ def _term(name: str) -> Smoothness:
         raise UserError(f"--smoothness {name}: there are {', '.join(Smoothness)}; choose one of them") from None
 
 
-def _asked(folder: OutputFolder) -> Mapping[str, Any]:
-    """What `thingmap run` was asked for, as far as the report says."""
-    report = folder.read_report()
-    command = report.get("command") if isinstance(report, dict) else None
-    return command if isinstance(command, dict) else {}
-
-
-def _open(folder: OutputFolder, name: str | None, dataset: str | None, asked: Mapping[str, Any]) -> Sequence:
-    """The sequence as it was mapped.
-
-    Raises:
-        UserError: nobody says which it is, or it is not there any more.
-    """
-    from ...datasets.errors import UserError
-    from ...datasets.open import open_sequence
-
-    if name is None:
-        raise UserError(f"{folder.report_file}: it does not say what was mapped; give that with --sequence")
-    try:
-        return open_sequence(name, dataset, asked.get("stride") or 1, asked.get("max_frames"))
-    except UserError as error:
-        raise UserError(f"{folder.path}: what it was made of: {error}; or say where it is with --sequence") from None
-
-
 def _tell(folder: OutputFolder, report: LabelReport) -> None:
     """What was done, in a few lines."""
     skipped = skipped_line(report.skipped)
@@ -160,9 +135,9 @@ def _tell_instances(instances: Instances) -> None:
     typer.echo(
         f"{len(things) - len(bare)} of {len(things)} things have points" + (f"; none: {_some(bare)}" if bare else "")
     )
-    doubted = [_sizes(thing) for thing in things if thing.size is not None and thing.size.disagrees.any()]
-    if doubted:
-        typer.echo(f"{len(doubted)} are of another size than their points: {_some(doubted)}")
+    told = [_sizes(thing) for thing in things if thing.size is not None and thing.size.estimate is not None]
+    if told:
+        typer.echo(f"{len(told)} have their place and size from their points: {_some(told)}")
     if instances.loose:
         loose = [f"{segment.label} of {segment.points}" for segment in instances.loose]
         typer.echo(f"{len(loose)} segments of points are no thing of the map's: {_some(loose)}")
@@ -171,7 +146,8 @@ def _tell_instances(instances: Instances) -> None:
 def _sizes(thing: ThingPoints) -> str:
     assert thing.size is not None
     box, points = (" x ".join(f"{100.0 * x:.0f}" for x in size) for size in (thing.size.volume, thing.size.extent))
-    return f"{thing.id} ({box} cm, points {points} cm)"
+    turned = "" if thing.box is None else f", turned by {math.degrees(thing.box.yaw):.0f} degrees"
+    return f"{thing.id} ({box} cm, points {points} cm{turned})"
 
 
 def _some(names: list[str]) -> str:

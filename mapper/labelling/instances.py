@@ -23,7 +23,8 @@ from .instance_config import InstanceConfig
 from .labelling import Labels
 from .labelling_config import LabellingConfig
 from .neighbours import neighbour_pairs
-from .segment_size import SizeCheck, check_size
+from .segment_box import SegmentBox, fit_box
+from .segment_size import SizeCheck, check_box, check_size
 from .voxels import Voxels
 
 NONE = 0  # number of a voxel that is no thing's
@@ -31,12 +32,19 @@ NONE = 0  # number of a voxel that is no thing's
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ThingPoints:
-    """What labelling says of a thing: its `id`, the number of its `points`, and what they say of its `size`; None for
-    too few to say anything."""
+    """What labelling says of a thing.
+
+    Attributes:
+        id: of the thing.
+        points: how many are its own.
+        size: what they say of its size, along the axes of `box` where there is one; None for too few to say anything.
+        box: that they lie on, in the map's upright frame; None for what is round, or seen from too few sides.
+    """
 
     id: str
     points: int
     size: SizeCheck | None
+    box: SegmentBox | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,12 +92,19 @@ def find_instances(
     number[rows] = owner + 1
     things = []
     for t, thing in enumerate(object_map.things):
-        own = points[owner == t]
-        local = _in_box(own, thing, object_map)
-        size = check_size(local, thing, config.voxels.voxel_size, config.instances)
-        things.append(ThingPoints(thing.id, len(own), size))
+        things.append(_say_of(thing, points[owner == t], object_map, config))
     loose = _loose(points, label, segment, explained, object_map.classes, config.instances)
     return Instances(number, tuple(things), loose)
+
+
+def _say_of(thing: Thing, own: np.ndarray, object_map: ObjectMap, config: LabellingConfig) -> ThingPoints:
+    """What a thing's own (M, 3) points say of it."""
+    voxel, numbers = config.voxels.voxel_size, config.instances
+    box = fit_box(own @ object_map.R_world_upright, voxel, config.boxes)
+    size = None if box is None else check_box(box, thing, numbers, config.boxes)
+    if size is not None:
+        return ThingPoints(thing.id, len(own), size, box)
+    return ThingPoints(thing.id, len(own), check_size(_in_box(own, thing, object_map), thing, voxel, numbers))
 
 
 def segments_of(cells: np.ndarray, label: np.ndarray) -> np.ndarray:

@@ -19,9 +19,8 @@ from .instances import Instances, ThingPoints
 from .voxels import Voxels
 
 BACKGROUND = "background"
-POINTS_KEYS = ("points", "points_size", "points_size_std")  # of a thing of the map, as `map_file` reads them
-SIZE_KEYS = ("size", "size_std")
-VOLUME = "volume_"  # before the names of those that were the volume's own, where points have changed them
+POINTS, VOLUME = "points", "volume"  # of a thing of the map's file, as it is read back: what labelling adds
+PLACE = ("position", "size", "size_std", "yaw")  # of a thing; those that the graph had are kept as its `VOLUME`
 
 
 def read_volumes(folder: OutputFolder) -> ObjectMap:
@@ -32,13 +31,8 @@ def read_volumes(folder: OutputFolder) -> ObjectMap:
     Raises:
         InputError: the folder holds no map.
     """
-    object_map, document = folder.read_map(edits=False), _read(folder)
-    before = {str(one["id"]): one for one in document["things"] if VOLUME + SIZE_KEYS[0] in one}
-    things = []
-    for thing in object_map.things:
-        if (own := before.get(thing.id)) is not None:
-            thing = replace(thing, **{name: np.array(own[VOLUME + name], dtype=np.float64) for name in SIZE_KEYS})
-        things.append(thing)
+    object_map = folder.read_map(edits=False)
+    things = (thing if thing.volume is None else thing.volume.of(thing) for thing in object_map.things)
     return replace(object_map, things=tuple(things))
 
 
@@ -60,7 +54,7 @@ def write_labelling(
     folder.write_labels(voxels.points, colors, label, object_map.classes, number, ids)
     points = {name: int(np.sum(label == k)) for k, name in enumerate(object_map.classes)}
     points = {name: count for name, count in points.items() if count} | {BACKGROUND: int(np.sum(label == NO_OBJECT))}
-    _add_counts(folder, points, instances)
+    _add_counts(folder, object_map, points, instances)
     return points
 
 
@@ -71,33 +65,35 @@ def labelled_colors(colors: np.ndarray, label: np.ndarray, classes: tuple[str, .
     return np.where((label == NO_OBJECT)[:, None], seen, table[label])
 
 
-def _add_counts(folder: OutputFolder, points: dict[str, int], instances: Instances | None) -> None:
+def _add_counts(
+    folder: OutputFolder, object_map: ObjectMap, points: dict[str, int], instances: Instances | None
+) -> None:
     """Beside the map's other values `labels`, with the file and the points of each class; for each thing its points.
 
-    A thing whose points disagree with its size takes the size of both (`points_size`); its volume's own stays beside it
-    as `volume_size` and `volume_size_std`. Readers that do not know these pass over them.
+    A thing whose points disagree with its size, or lie on a box, takes the place and the size that they tell; what the
+    graph had stays beside it as `volume`. Readers that do not know these pass over them.
     """
     document = _read(folder)
     things = document.pop("things")
     own = {} if instances is None else {one.id: one for one in instances.things}
     for thing in things:
-        for name in SIZE_KEYS:
-            thing[name] = thing.pop(VOLUME + name, thing[name])
-        for name in POINTS_KEYS:
-            thing.pop(name, None)
+        thing |= thing.pop(VOLUME, {})
+        thing.pop(POINTS, None)
         if thing["id"] in own:
-            thing |= _of_points(own[thing["id"]], thing)
+            thing |= _of_points(own[thing["id"]], thing, object_map.R_world_upright)
     document |= {"labels": {"file": folder.labels_file.name, "points": points}, "things": things}
     write_atomic(folder.map_file, format_document(document).encode())
 
 
-def _of_points(found: ThingPoints, thing: dict[str, Any]) -> dict[str, Any]:
+def _of_points(found: ThingPoints, thing: dict[str, Any], R_world_upright: np.ndarray) -> dict[str, Any]:
     """What changes of a thing of the map's file."""
-    values: dict[str, Any] = {"points": found.points}
-    if found.size is not None and found.size.estimate is not None and found.size.std is not None:
-        for name, value in zip(SIZE_KEYS, (found.size.estimate.tolist(), found.size.std.tolist()), strict=True):
-            values |= {name: value, f"points_{name}": value, VOLUME + name: thing[name]}
-    return values
+    values: dict[str, Any] = {POINTS: found.points}
+    if found.size is None or found.size.estimate is None or found.size.std is None:
+        return values
+    values |= {"size": found.size.estimate.tolist(), "size_std": found.size.std.tolist()}
+    if found.box is not None:
+        values |= {"position": (R_world_upright @ found.box.center).tolist(), "yaw": found.box.yaw}
+    return values | {VOLUME: {name: thing[name] for name in PLACE}}
 
 
 def _read(folder: OutputFolder) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from ...datasets.errors import UserError
 from ...detectors.hog.maps import MapConfig
 from ...detectors.probability_maps import ALPHA
+from .box_config import BoxConfig
 from .instance_config import InstanceConfig
 from .mrf_config import MrfConfig
 from .voxel_config import VoxelConfig
@@ -63,6 +64,7 @@ class LabellingConfig:
         voxels: in which it is gathered.
         mrf: what makes labels of it.
         instances: how labelled voxels become points of things.
+        boxes: how boxes are fitted to those.
         moved: metres, and
         turned: radians, by which a frame may have moved against its keyframe without being looked at again: half a
             voxel at 3 m.
@@ -76,6 +78,7 @@ class LabellingConfig:
     voxels: VoxelConfig = field(default_factory=VoxelConfig)
     mrf: MrfConfig = field(default_factory=MrfConfig)
     instances: InstanceConfig = field(default_factory=InstanceConfig)
+    boxes: BoxConfig = field(default_factory=BoxConfig)
     moved: float = 0.003
     turned: float = 0.0015
 

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..map.thing import Thing
+from .box_config import BoxConfig
 from .instance_config import InstanceConfig
+from .segment_box import SegmentBox
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -18,7 +20,8 @@ class SizeCheck:
         volume: the size of its volume.
         extent: of its segment.
         disagrees: bool, where they differ by more than they may.
-        estimate: the size from both where any of them disagrees, else None; axes that agree keep the volume's.
+        estimate: the size from both where any of them disagrees, else None; axes that agree keep the volume's. Of a
+            thing that is a box, the box's.
         std: standard deviations of `estimate`.
     """
 
@@ -61,3 +64,23 @@ def check_size(local: np.ndarray, thing: Thing, voxel: float, config: InstanceCo
     std = strain * np.sqrt(variance * other / (variance + other))
     estimate = np.where(disagrees, size + weight * (extent - size), size)
     return SizeCheck(size, extent, disagrees, estimate, np.where(disagrees, std, thing.size_std))
+
+
+def check_box(box: SegmentBox, thing: Thing, config: InstanceConfig, limits: BoxConfig) -> SizeCheck | None:
+    """Compare a thing's volume with the box that its points lie on, along that box's axes; None where the box is not
+    the thing's: a piece of it, it and its neighbour, or seen from too few sides.
+
+    Faces are where they were seen, and a volume is an upright cylinder about the detector's boxes, so that the size of
+    a box is believed as it is. The volume's extent along axes turned by a is 2 hypot(w cos a, d sin a) / 2.
+    """
+    if not box.known.all():
+        return None
+    cosine, sine = np.cos(box.yaw - thing.yaw), np.sin(box.yaw - thing.yaw)
+    turn = np.array([[cosine, sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    volume = np.sqrt(turn**2 @ thing.size**2)
+    share = float(np.prod(box.size) / max(np.prod(thing.size), 1e-9))
+    if not limits.shrink <= share <= limits.grow:
+        return None
+    std = np.sqrt(turn**2 @ thing.size_std**2)
+    disagrees = np.abs(box.size - volume) > std + np.maximum(config.share * volume, config.excess)
+    return SizeCheck(volume, box.size, disagrees, box.size, box.std)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from thingmap.mapper.labelling.box_config import BoxConfig
 from thingmap.mapper.labelling.labelling import Labels
+from thingmap.mapper.labelling.labelling_config import LabellingConfig
 from thingmap.mapper.labelling.voxel_merge import Voxels
 from thingmap.mapper.map.object_map import MapFrame, ObjectMap
 from thingmap.mapper.map.thing import Evidence, Thing
 from thingmap.mapper.map.up_direction import UpDirection
 
 CLASSES = ("cup", "bowl")
+NO_BOXES = LabellingConfig(boxes=BoxConfig(round_from=0.0))  # blocks, as boxes as they are, are taken for round things
 
 
 def block(corner, size) -> np.ndarray:

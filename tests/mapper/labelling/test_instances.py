@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from instance_blocks import block, make_map, make_thing, make_voxels
+from instance_blocks import NO_BOXES, block, make_map, make_thing, make_voxels
 from label_runs import SYNTH, labelled
 
 from thingmap.datasets.errors import UserError
@@ -21,10 +21,10 @@ from thingmap.mapper.map.boxes import inside_box
 CUP, BOWL = 0, 1
 
 
-def found(parts, things):
+def found(parts, things, config=NO_BOXES):
     """Instances of blocks (cells, label), and the rows of each block in them."""
     voxels, labels, rows = make_voxels(parts)
-    return find_instances(voxels, labels, make_map(things)), rows
+    return find_instances(voxels, labels, make_map(things), config), rows
 
 
 def test_each_thing_owns_the_segment_in_its_volume():
@@ -115,6 +115,31 @@ def test_points_that_fall_short_count_less_than_points_beyond():
         return abs(size.estimate[0] - 0.12) / abs(size.extent[0] - 0.12)
 
     assert estimate(5) < 0.6 < estimate(19)  # the share of the difference that is believed
+
+
+def shell(size) -> np.ndarray:
+    """Cells of the sides and the top of a block that stands on z = 0."""
+    cells = block((0, 0, 0), size)
+    outside = (cells[:, :2] == 0) | (cells[:, :2] == np.array(size[:2]) - 1)
+    return cells[outside.any(axis=1) | (cells[:, 2] == size[2] - 1)]
+
+
+@pytest.mark.parametrize("volume", [(0.2, 0.2, 0.25), (0.08, 0.21, 0.26)])
+def test_the_box_that_points_lie_on_is_the_things(volume):
+    thing = make_thing(1, "cup", (0.05, 0.1, 0.12), volume)
+    result, _ = found([(shell((6, 20, 25)), CUP)], [thing], None)
+    (one,) = result.things
+    assert one.box is not None and one.size is not None and one.size.estimate is not None
+    assert np.sort(one.size.estimate) == pytest.approx([0.05, 0.19, 0.24], abs=0.006)  # between centres of cells
+    assert one.box.center == pytest.approx([0.03, 0.1, 0.125], abs=0.006)
+    wide = np.argmin(one.size.extent)
+    assert one.size.disagrees[wide] == (volume[0] == 0.2)
+
+
+@pytest.mark.parametrize("volume", [(0.6, 0.6, 0.6), (0.04, 0.1, 0.1)])
+def test_a_box_of_quite_another_size_is_another_things(volume):
+    result, _ = found([(shell((6, 20, 25)), CUP)], [make_thing(1, "cup", (0.03, 0.1, 0.12), volume)], None)
+    assert result.things[0].box is None
 
 
 def test_few_points_say_nothing_of_a_size():
