@@ -41,8 +41,9 @@ def test_the_real_cabinet_under_its_own_poses(real_data: Path) -> None:
     folder = real_data / "tum_fr3_cabinet"
     (truth,) = open_truth(str(folder)).objects
     outcome = run(open_sequence(folder), folder, OdometrySource.POSES, truth)
-    assert outcome.ate < 0.03 and outcome.cuboid is not None
-    assert outcome.cuboid.centre_error < 0.08 and outcome.cuboid.overlap > 0.2
+    assert outcome.ate < 0.03 and outcome.volume is not None and outcome.labelled is not None
+    assert outcome.volume.centre_error < 0.08 and outcome.volume.overlap > 0.2
+    assert outcome.labelled.centre_error < 0.03 and outcome.labelled.overlap > 0.7
 
 
 def test_a_folder_without_keyframes_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
