@@ -26,6 +26,7 @@ from thingmap.detectors.recorded import RecordedDetections
 from thingmap.factors.evidence_model import load_evidence_model
 from thingmap.mapper.config import KeyframeConfig, MapperConfig, OdometryConfig, OdometrySource
 from thingmap.mapper.config_file import dump_config
+from thingmap.mapper.evaluation.boxes.image_boxes import EDGE, found_boxes
 from thingmap.mapper.evaluation.boxes.matching import Matches, match_boxes
 from thingmap.mapper.evaluation.boxes.projection import projected_boxes
 from thingmap.mapper.evaluation.inputs.build_case import build_case
@@ -34,6 +35,7 @@ from thingmap.mapper.evaluation.inputs.load_run import load_run
 from thingmap.mapper.evaluation.points.labelled_points import LabelledPoints, label_points
 from thingmap.mapper.map.store import OutputFolder
 from thingmap.mapper.mapper import SemanticMapper
+from thingmap.mapper.multiview.track_judge import load_judge
 from thingmap.mapper.multiview.track_mapper import TrackMapper
 from thingmap.mapper.runner import SequenceRun
 from thingmap.mapper.saving import save_run
@@ -48,21 +50,24 @@ class Mode(StrEnum):
     SINGLE = "single view"
     TRACKS_POSES = "tracks, true poses"
     TRACKS = "tracks"
+    JUDGED_POSES = "judged tracks, true poses"
+    JUDGED = "judged tracks"
     GRAPH_POSES = "graph, true poses"
     GRAPH = "graph"
 
     @property
     def has_poses(self) -> bool:
         """Whether the true poses are given."""
-        return self in (Mode.TRACKS_POSES, Mode.GRAPH_POSES)
+        return self in (Mode.TRACKS_POSES, Mode.JUDGED_POSES, Mode.GRAPH_POSES)
 
 
 TRACKS, GRAPHS = (Mode.TRACKS_POSES, Mode.TRACKS), (Mode.GRAPH_POSES, Mode.GRAPH)
+JUDGES = (Mode.JUDGED_POSES, Mode.JUDGED)
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A rendered scene in a folder, the detector's model, and what the graph knows of the detector.
+    """A rendered scene in a folder, the detector's model, and what graph and judge know of the detector.
 
     `believed` are thresholds, from which a thing of a graph labels points; None where no points are labelled.
     """
@@ -71,6 +76,7 @@ class Job:
     folder: Path
     model: Path
     evidence: Path
+    judge: Path
     believed: Mapping[Mode, float | None] | None = None
 
 
@@ -96,7 +102,7 @@ class JudgedScene:
 
 
 def judge_scene(job: Job) -> JudgedScene:
-    """Detect, map four times, and match.
+    """Detect, map six times, and match.
 
     Raises:
         UserError: the scene has no truth by frame, or a model cannot be read.
@@ -110,9 +116,11 @@ def judge_scene(job: Job) -> JudgedScene:
     called: dict[Mode, list[Called]] = {}
     points: dict[Mode, LabelledPoints] = {}
     matches[Mode.SINGLE], called[Mode.SINGLE] = _single_views(detector, sequence, truth)
-    for mode in (*TRACKS, *GRAPHS):
+    for mode in (*TRACKS, *JUDGES, *GRAPHS):
         mapped = _map(mode, job, sequence, detector, truth)
-        if isinstance(mapped.mapper, TrackMapper):
+        if isinstance(mapped.mapper, TrackMapper) and mode in JUDGES:
+            matches[mode] = _drawn(mapped.mapper, detector.classes, mapped.case)
+        elif isinstance(mapped.mapper, TrackMapper):
             matches[mode], called[mode] = _tracked(mapped.mapper, detector.classes, mapped.case)
         else:
             matches[mode] = _projected(mapped.case)
@@ -129,8 +137,9 @@ class _Mapped(NamedTuple):
 def _map(mode: Mode, job: Job, sequence: Sequence, detector: RecordedDetections, truth: GroundTruth) -> _Mapped:
     """One mapper over the frames; its output folder is read back as the evaluator does."""
     about = {"source": sequence.name, "gravity": sequence.gravity}
-    if mode in TRACKS:
-        mapper = TrackMapper(detector, mapper_config(mode.has_poses), **about)
+    if mode in (*TRACKS, *JUDGES):
+        judge = load_judge(job.judge) if mode in JUDGES else None
+        mapper = TrackMapper(detector, mapper_config(mode.has_poses), judge=judge, **about)
     else:
         model = load_evidence_model(job.evidence)
         mapper = SemanticMapper(detector, mapper_config(mode.has_poses), model=model, **about)
@@ -173,6 +182,18 @@ def _tracked(mapper: TrackMapper, classes: tuple[str, ...], case: Case) -> tuple
         score = np.array([scores.get(t, 0.0) for t in tracks.tolist()], dtype=np.float64)
         both.append(judge_called(xyxy, np.where(class_id >= 0, number[class_id], BACKGROUND), score, case.truth, index))
     return [match for match, _ in both], [called for _, called in both]
+
+
+def _drawn(mapper: TrackMapper, classes: tuple[str, ...], case: Case) -> list[Matches]:
+    """Judged tracks in every frame that shows or could show them, as their likeliest class by the probability of it."""
+    number, k, matches = class_numbers(classes, case.truth), case.truth.intrinsics, []
+    assert k is not None
+    for index, row in zip(case.truth_index.tolist(), case.run_index.tolist(), strict=True):
+        drawn = mapper.drawn_tracks(row)  # every frame is a keyframe
+        known = number[drawn.class_id] != BACKGROUND
+        boxes = found_boxes(drawn.xyxy[known] - EDGE, number[drawn.class_id[known]], drawn.score[known], k)
+        matches.append(match_boxes(boxes, truth_of(case.truth, index), JUDGED.box_iou, index))
+    return matches
 
 
 def _projected(case: Case) -> list[Matches]:

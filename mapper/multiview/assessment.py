@@ -25,6 +25,7 @@ class Fate(Enum):
     KEPT = "kept"
     BACKGROUND = "background"  # seen often enough, likeliest no object
     DROPPED = "dropped"  # seen in too few of the views that could show it
+    REPEATED = "repeated"  # a surer track is in the same place; only where tracks are judged by what was learned
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,10 +33,10 @@ class Assessment:
     """T tracks over V views, under the poses as they were when it was made.
 
     Attributes:
-        posterior: (T, K + 1) p(C | all views), the background last.
+        posterior: (T, K + 1) p(C | all views), the background last; by Bayes' rule, or by a `TrackJudge`.
         per_view: (T, K + 1) the same if all views of a track counted as one: their geometric mean. What one view takes
             for something, the next often does too: after ten of them the posterior is 1 or 0 in most tracks, wrong ones
-            among them, and no longer tells which are surer.
+            among them, and no longer tells which are surer. Of a `TrackJudge` it is the posterior.
         centroids: (T, 3) world, metres.
         seen: (T, V) bool, whether a detection of the view is of the track.
         sight: (T, V) `Sight` of its centroid.

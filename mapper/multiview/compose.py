@@ -28,8 +28,9 @@ class Composer:
     """Makes things of tracks.
 
     A thing's existence is 1 - P(background | all views), and nothing else: neither its share of views nor their number
-    counts. Posterior and existence are those of Bayes' rule over views taken as independent, which they are not: they
-    come out surer than they should. So does the position's covariance, as views from one side are wrong together.
+    counts. Posterior and existence are those of the assessment: by Bayes' rule over views taken as independent, which
+    they are not, they come out surer than they should. So does the position's covariance, as views from one side are
+    wrong together.
 
     Attributes:
         classes: K names.

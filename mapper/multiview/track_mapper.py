@@ -17,10 +17,14 @@ from ..map.upright import upright_rotation
 from ..mapper import MapUpdate, SemanticMapper
 from .assessment import Assessment, Fate, assess
 from .compose import Composer
+from .drawn_boxes import DrawnTracks, draw_tracks
+from .judging import judged
 from .kept_views import KeptView, ViewStack
 from .observations import Observations, observe
 from .point_labels import label_points
 from .sight import sight
+from .track_evidence import TrackEvidence, gather, track_features
+from .track_judge import TrackJudge
 from .tracks import Tracks
 
 
@@ -32,6 +36,7 @@ class TrackMapper(SemanticMapper):
 
     Args:
         detector, config, source, gravity: as for `SemanticMapper`; what is known of the detector is of no use here.
+        judge: which tracks are things, and which, is decided by what it learned; None for the paper's rules.
     """
 
     def __init__(
@@ -41,14 +46,19 @@ class TrackMapper(SemanticMapper):
         *,
         source: str = "",
         gravity: np.ndarray | None = None,
+        judge: TrackJudge | None = None,
     ) -> None:
         super().__init__(detector, config, source=source, gravity=gravity)
+        self._judge = judge
         self._tracks = Tracks()
         self._views: list[KeptView] = []
         self._assessment: Assessment | None = None  # of the views so far
+        self._evidence: tuple[TrackEvidence, ...] | None = None  # likewise, of every track
 
     def process_frame(self, frame: Frame, detections: Detections | None = None) -> MapUpdate:
         """Adds one frame; arguments and errors as for `SemanticMapper.process_frame`.
+
+        A UserError too where the judge does not know the detector's classes.
 
         `things` is the number of tracks that are likelier something than background, seldom seen ones among them.
         """
@@ -67,10 +77,12 @@ class TrackMapper(SemanticMapper):
                 self._track(view, found, observations)
             with self._clock.stage("cloud"):
                 self._cloud.add(frame, view.keyframe, self._camera.smoother.pose(view.keyframe))
-        self._assessment = None  # where there is no new view, poses may have changed
+        self._assessment = self._evidence = None  # where there is no new view, poses may have changed
         return MapUpdate(frame.index, is_keyframe, self._camera.pose(), self._count_things())
 
     def _observe(self, found: Detections, frame: Frame) -> Observations:
+        if self._judge is not None:
+            self._judge.check(found.classes)
         observations, refused = observe(found, frame, self.config.lifting, self.config.multiview)
         self._outcomes.update(refused)
         return observations
@@ -96,8 +108,17 @@ class TrackMapper(SemanticMapper):
                 centroids = self._tracks.centroids(self._camera.smoother.poses())
                 sights = sight(centroids, stack, self.config.multiview)
                 log_posterior = self._tracks.log_posterior
-                self._assessment = assess(log_posterior, centroids, self._views, sights, self.config.multiview)
+                found = assess(log_posterior, centroids, self._views, sights, self.config.multiview)
+                if self._judge is not None:
+                    found = judged(found, self._gather(found), self._judge, self.config.multiview.extent)
+                self._assessment = found
         return self._assessment
+
+    def _gather(self, assessment: Assessment) -> tuple[TrackEvidence, ...]:
+        if self._evidence is None:
+            poses, axes = self._camera.smoother.poses(), upright_rotation(self._camera.up().direction)
+            self._evidence = gather(self._views, poses, axes, assessment.shares)
+        return self._evidence
 
     def object_map(self, include_doubtful: bool = False) -> ObjectMap:
         """The map as estimated now; `include_doubtful` adds tracks that were dropped or are likeliest background."""
@@ -144,13 +165,35 @@ class TrackMapper(SemanticMapper):
         Raises:
             IndexError: there is no such keyframe.
         """
-        count = self._camera.smoother.keyframes if self._camera.started else 0
-        if not 0 <= keyframe < count:
-            raise IndexError(f"keyframe must be one of the {count} there are, but got {keyframe}")
+        self._check_keyframe(keyframe)
         view = next((view for view in self._views if view.keyframe == keyframe), None)
         if view is None:
             return np.empty((0, 4)), np.empty(0, dtype=np.int64)
         return view.xyxy.copy(), view.track.copy()
+
+    def drawn_tracks(self, keyframe: int) -> DrawnTracks:
+        """The tracks that a keyframe shows or could show, where their points of all views would be seen in it.
+
+        Args:
+            keyframe: number, counted from 0; nothing is drawn into one whose place was not known.
+
+        Raises:
+            IndexError: there is no such keyframe.
+        """
+        self._check_keyframe(keyframe)
+        assessment = self.assess()
+        column = next((c for c, view in enumerate(self._views) if view.keyframe == keyframe), None)
+        if assessment is None or column is None:
+            return DrawnTracks(np.empty(0, np.int64), np.empty((0, 4)), np.empty(0, np.int64), np.empty(0))
+        T_upright_world = np.eye(4)
+        T_upright_world[:3, :3] = upright_rotation(self._camera.up().direction).T
+        T_upright_camera = T_upright_world @ self._camera.smoother.pose(keyframe)
+        return draw_tracks(assessment, self._gather(assessment), column, T_upright_camera, self._camera.intrinsics)
+
+    def _check_keyframe(self, keyframe: int) -> None:
+        count = self._camera.smoother.keyframes if self._camera.started else 0
+        if not 0 <= keyframe < count:
+            raise IndexError(f"keyframe must be one of the {count} there are, but got {keyframe}")
 
     def track_labels(self) -> dict[int, tuple[int, float]]:
         """Number of every track -> its final class, -1 for background and dropped, and that one's probability.
@@ -169,6 +212,12 @@ class TrackMapper(SemanticMapper):
         if assessment is None:
             return {}
         return {t: float(assessment.per_view[t, k]) for t, k in enumerate(assessment.labels)}
+
+    def track_features(self) -> np.ndarray:
+        """(T, F) of every track, what a `TrackJudge` learns from; columns as `track_evidence.track_features`."""
+        assessment, classes = self.assess(), len(self._classes or ())
+        tracks = () if assessment is None else self._gather(assessment)
+        return track_features(tracks, classes, self.config.multiview.extent)
 
     def statistics(self) -> dict[str, Any]:
         """As `SemanticMapper.statistics`, and `tracks`: views, observations, and tracks by what became of them."""

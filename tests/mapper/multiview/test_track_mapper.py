@@ -71,6 +71,7 @@ def test_a_track_seen_in_too_few_of_the_views_that_could_show_it_is_dropped(card
         "kept": 1,
         "background": 0,
         "dropped": 1,
+        "repeated": 0,
     }
     dropped = mapper.object_map(include_doubtful=True).things[1]
     assert dropped.label == "bowl" and 0.0 < dropped.existence < 0.5
