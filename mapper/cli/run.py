@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ...detectors.detector import Detector
     from ..config import MapperConfig, OdometryConfig
     from ..mapper import SemanticMapper
+    from ..multiview.track_judge import TrackJudge
 
 
 class Inference(StrEnum):
@@ -27,6 +28,7 @@ class Inference(StrEnum):
     TRACKS = "tracks"
 
 
+SHIPPED = "shipped"  # name of the judge that comes with thingmap
 DEFAULT_VIEWS = 12  # of batch inference; the most in Meger et al., Clutter, figure 8
 
 
@@ -57,6 +59,13 @@ def run(
     views: Annotated[
         int | None,
         typer.Option(min=1, metavar="N", help=f"Views of batch inference, evenly spread; {DEFAULT_VIEWS} by default."),
+    ] = None,
+    judge: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE",
+            help=f"Of tracks: what was learned of them decides, not Bayes' rule; {SHIPPED}: that for shape-context.",
+        ),
     ] = None,
     stride: StrideOption = 1,
     max_frames: MaxFramesOption = None,
@@ -96,6 +105,10 @@ def run(
         raise UserError(
             f"--views {views}: only of use with --inference {Inference.BATCH}; add it, or leave out --views"
         )
+    if judge is not None and inference is not Inference.TRACKS:
+        raise UserError(
+            f"--judge {judge}: only of use with --inference {Inference.TRACKS}; add it, or leave out --judge"
+        )
     OutputFolder.check(output, overwrite)
     live = live_targets(view, serve, save, overwrite)
     frames = open_sequence(sequence, dataset=dataset, stride=stride, max_frames=max_frames)
@@ -103,7 +116,7 @@ def run(
     _check_odometry(settings.odometry, frames, sequence)
     spec = choose_detector(detector, sequence, frames)
     detect = make_detector(spec, frames)
-    mapper = _make_mapper(frames, detect, settings, inference, views)
+    mapper = _make_mapper(frames, detect, settings, inference, views, judge)
     MappingJob(
         sequence=frames,
         mapper=mapper,
@@ -117,7 +130,7 @@ def run(
             "detector": spec,
             "stride": stride,
             "max_frames": max_frames,
-            **_inference_options(inference, views),
+            **_inference_options(inference, views, judge),
         },
         include_doubtful=include_doubtful,
         snapshots=parse_snapshot_frames(snapshots) if snapshots is not None else (),
@@ -125,18 +138,23 @@ def run(
     ).execute()
 
 
-def _inference_options(inference: Inference, views: int | None) -> dict[str, str | int]:
+def _inference_options(inference: Inference, views: int | None, judge: str | None) -> dict[str, str | int]:
     """What the report says of how things were found, unless it is the usual way."""
     match inference:
         case Inference.BATCH:
             return {"inference": inference.value, "views": views or DEFAULT_VIEWS}
         case Inference.TRACKS:
-            return {"inference": inference.value}
+            return {"inference": inference.value, **({"judge": judge} if judge else {})}
     return {}
 
 
 def _make_mapper(
-    frames: Sequence, detect: Detector, settings: MapperConfig, inference: Inference, views: int | None
+    frames: Sequence,
+    detect: Detector,
+    settings: MapperConfig,
+    inference: Inference,
+    views: int | None,
+    judge: str | None,
 ) -> SemanticMapper:
     about = {"source": frames.name, "gravity": frames.gravity}
     if inference is Inference.BATCH:
@@ -147,10 +165,19 @@ def _make_mapper(
     if inference is Inference.TRACKS:
         from ..multiview.track_mapper import TrackMapper
 
-        return TrackMapper(detect, settings, **about)
+        return TrackMapper(detect, settings, judge=_judge(judge), **about)
     from ..mapper import SemanticMapper
 
     return SemanticMapper(detect, settings, **about)
+
+
+def _judge(name: str | None) -> TrackJudge | None:
+    """What decides about tracks, if not Bayes' rule."""
+    from ..multiview.track_judge import load_judge, shipped_judge
+
+    if name is None:
+        return None
+    return load_judge(shipped_judge() if name == SHIPPED else Path(name))
 
 
 def _check_odometry(odometry: OdometryConfig, frames: Sequence, sequence: str) -> None:

@@ -94,6 +94,11 @@ class TrackJudge:
             raise UserError(f"{path} cannot be written: {error.strerror}") from error
 
 
+def shipped_judge() -> Path:
+    """Of tracks of the shape-context detector that ships, by benchmarks/shape_context_judge.py."""
+    return Path(__file__).with_name("judge.json")
+
+
 def load_judge(path: Path) -> TrackJudge:
     """Raises InputError for a file that is not what `TrackJudge.save` writes."""
     try:

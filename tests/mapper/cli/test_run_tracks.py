@@ -77,6 +77,31 @@ def test_views_are_for_batch_inference_only(tmp_path):
     assert "Traceback" not in result.output and not (tmp_path / "out").exists()
 
 
+def test_a_judge_decides_about_tracks(tmp_path):
+    out = tmp_path / "out"
+    detector = ["--detector", "shape-context?confidence=0"]
+    result = thingmap("run", SYNTH, "-o", out, *TRACKS, *detector, "--judge", "shipped")
+    assert result.exit_code == 0, result.output
+    report = json.loads((out / "report.json").read_text())
+    assert report["command"]["judge"] == "shipped"
+    tracks = report["mapper"]["tracks"]
+    fates = sum(tracks[fate] for fate in ("kept", "background", "dropped", "repeated"))
+    assert fates == tracks["tracks"] > 0
+    assert f"became {tracks['tracks']} tracks" in result.output
+
+
+def test_a_judge_is_for_tracks_of_its_classes_only(tmp_path):
+    out = tmp_path / "out"
+    for arguments, told in (
+        (["--judge", "shipped"], "--inference tracks"),
+        ([*TRACKS, "--judge", tmp_path / "none.json"], "none.json"),
+        ([*TRACKS, "--judge", "shipped", "--detector", "proposals"], "the detector has unknown"),
+    ):
+        result = thingmap("run", SYNTH, "-o", out, *arguments)
+        assert result.exit_code == 2 and told in result.stderr, result.output
+        assert "Traceback" not in result.output
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [
