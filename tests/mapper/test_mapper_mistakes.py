@@ -62,6 +62,26 @@ def test_other_classes_half_way_are_refused_and_the_map_goes_on(half, sample_fra
     assert len(half.object_map()) >= len(before)
 
 
+def test_embeddings_of_another_length_are_refused_before_the_map_changes(sample_frames, sample_detections):
+    def with_embeddings(found: Detections, length: int) -> Detections:
+        return replace(found, embedding=np.ones((len(found), length), dtype=np.float32))
+
+    mapper = SemanticMapper(None, GIVEN_POSES, source="sample")
+    for frame, found in zip(sample_frames[:8], sample_detections[:8], strict=True):
+        mapper.process_frame(frame, with_embeddings(found, 4))
+    keyframes = mapper.statistics()["keyframes"]
+    refused = 0
+    for frame, found in zip(sample_frames[8:16], sample_detections[8:16], strict=True):
+        try:
+            mapper.process_frame(frame, with_embeddings(found, 3))
+        except UserError as error:
+            refused += 1
+            assert frame.name in str(error) and "4" in str(error) and "3" in str(error)
+    assert refused >= 1 and mapper.statistics()["keyframes"] == keyframes
+    things = mapper.object_map().things
+    assert things and all(thing.embedding is not None and thing.embedding.shape == (4,) for thing in things)
+
+
 def test_a_detector_that_fails_once_leaves_the_mapper_whole(sample_frames, sample):
     detector, failed = SimulatedDetector(sample), []
 
