@@ -35,6 +35,7 @@ from .information_kernel import look_gains
 FEW = 4  # classes that are hypotheses of their own: detectors confuse few, and the time grows with the square
 WHOLE = 0  # template
 CERTAIN = 1.0 - 1e-9  # of a class beside which there is no other that could be taken for it
+NEGLIGIBLE = 1e-12  # probability of a state that is left out: 4e-11 bits, and products of smaller ones underflow
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,6 +111,7 @@ def make_questions(
     counts = np.ones(shares.shape)
     counts[:, few:] = K - few
     prior = np.column_stack([1.0 - existence, existence[:, None] * shares])
+    prior[prior < NEGLIGIBLE] = 0.0
     groups = np.tile(np.arange(few + more + 1), (N, 1))
     if labels is not None:
         groups = np.column_stack([np.zeros(N), np.isin(chosen, labels), np.zeros((N, more))]).astype(np.int64)

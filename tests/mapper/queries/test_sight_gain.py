@@ -120,6 +120,12 @@ def test_no_look_tells_more_than_is_unknown(existence, weights, luck, visible, e
     assert 0.0 <= told <= q.bits[0] + 1e-9
 
 
+def test_what_hardly_exists_tells_nothing() -> None:
+    posterior = np.array([[0.0] * 6 + [1.0]])
+    q = make_questions(ONE * 2.2e-313, posterior, NONE, NONE, model_of(tuple("abcdefg")))
+    assert gain(q) == 0.0 and q.bits[0] == 0.0
+
+
 def test_a_label_asks_for_less_than_everything_and_is_never_among_the_others() -> None:
     model = model_of(tuple("abcdefg"))
     posterior = np.array([[0.3, 0.25, 0.2, 0.1, 0.08, 0.05, 0.02]])
