@@ -88,10 +88,17 @@ def remark(question: Question, object_map: ObjectMap) -> str | None:
     Raises:
         UserError: the map knows no such label or thing.
     """
-    if question.label is None or object_map.called(question.label):
-        return None
-    object_map.labels_of(question.label)
-    return None if object_map.knows(question.label) else str(object_map.understand(question.label))
+    notes = []
+    if question.label is not None and not object_map.called(question.label):
+        object_map.labels_of(question.label)
+        if not object_map.knows(question.label):
+            notes.append(str(object_map.understand(question.label)))
+    if question.kind in (Kind.ON, Kind.UNDER, Kind.NEXT_TO):
+        tops = object_map.table_tops(question.subject)
+        if tops:
+            what = "level surface" if len(tops) == 1 else f"{len(tops)} level surfaces"
+            notes.append(f"no {question.subject} in the map: taken as the {what} as high as a table in its cloud")
+    return "\n".join(notes) or None
 
 
 def ask(question: Question, object_map: ObjectMap, out: Path) -> list[Any]:

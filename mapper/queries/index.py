@@ -15,6 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..map.polygon import Polygon
 from ..map.region import Ball, Box
 from ..map.thing import Thing
 from .answer import Answer
@@ -120,15 +121,41 @@ class ThingIndex:
         rows = asked.rows[places[found]].tolist()
         return [(self._things[row], inside) for row, inside in zip(rows, p[found].tolist(), strict=True)]
 
+    def over(
+        self, region: Polygon, R_world_upright: np.ndarray, label: Labels, min_probability: float
+    ) -> list[tuple[Thing, float]]:
+        """Things that are what was asked for and may be over a polygon: all that are with at least `min_probability`,
+        and some more.
+
+        Args:
+            region: in the upright frame.
+            R_world_upright: (3, 3) axes of that frame.
+            label, min_probability: as for `within`.
+
+        Returns:
+            Unsorted things with P(it is what was asked for), wherever it is.
+        """
+        asked = self._asked(label, min_probability)
+        low, high = (
+            np.append(region.corners.min(axis=0), region.low),
+            np.append(region.corners.max(axis=0), region.high),
+        )
+        margin = _sigmas(min_probability) * self._widest + ROUNDING
+        centre, radius = self._ball
+        height = float(centre @ R_world_upright[:, 2])
+        bounds = np.array([low - margin, high + margin])
+        bounds[:, 2] = np.clip(bounds[:, 2], height - radius - ROUNDING, height + radius + ROUNDING)
+        corners = np.stack(np.meshgrid(*bounds.T, indexing="ij"), axis=-1).reshape(-1, 3) @ R_world_upright.T
+        places = asked.in_box(corners.min(axis=0), corners.max(axis=0))
+        upright = asked.positions[places] @ R_world_upright
+        return self._with_probability(asked, places[np.all((upright >= bounds[0]) & (upright <= bounds[1]), axis=1)])
+
     def _places_within(self, region: Box | Ball, asked: Asked, min_probability: float) -> np.ndarray:
         """Places in `asked.rows` of all that may be inside with at least `min_probability`.
 
         Both regions are convex: with its mean at a distance d outside a face, a point is inside with Φ(-d / σ) at most.
         """
-        from scipy.special import ndtri
-
-        least = min_probability - INTEGRAL_ERROR
-        sigmas = 0.0 if least >= 0.5 else FARTHEST if least <= 0.0 else min(float(-ndtri(least)), FARTHEST)
+        sigmas = _sigmas(min_probability)
         low, high = _extent(region)
         places = asked.in_box(low - sigmas * self._widest - ROUNDING, high + sigmas * self._widest + ROUNDING)
         if sigmas:  # the widest of all may be far from here
@@ -181,8 +208,24 @@ class ThingIndex:
         return np.sqrt(np.maximum(np.einsum("nii->ni", self._covariances(np.arange(len(self._things)))), 0.0))
 
     @cached_property
+    def _ball(self) -> tuple[np.ndarray, float]:
+        """Centre (3,) and radius, metres, of a ball that holds all centres."""
+        if not len(self._positions):
+            return np.zeros(3), 0.0
+        low, high = self._positions.min(axis=0), self._positions.max(axis=0)
+        return (low + high) / 2.0, float(np.linalg.norm(high - low)) / 2.0
+
+    @cached_property
     def _widest(self) -> float:
         return float(self._stds.max(initial=0.0))
+
+
+def _sigmas(min_probability: float) -> float:
+    """Standard deviations outside a face up to which a point may be inside with that probability: Φ(-d / σ) at most."""
+    from scipy.special import ndtri
+
+    least = min_probability - INTEGRAL_ERROR
+    return 0.0 if least >= 0.5 else FARTHEST if least <= 0.0 else min(float(-ndtri(least)), FARTHEST)
 
 
 def _extent(region: Box | Ball) -> tuple[np.ndarray, np.ndarray]:

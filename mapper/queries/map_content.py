@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from ..map.up_direction import UpDirection
     from .index import ThingIndex
 
+LISTED = 12  # ids named in a message
+
 
 class MapContent:
     """Base of the classes of questions, which are methods of `ObjectMap`; its attributes are documented there."""
@@ -43,5 +45,12 @@ class MapContent:
         wanted = which if isinstance(which, str) else which.id
         own = next((other for other in self.things if other.id == wanted), None)
         if own is None:
-            raise UserError(f"{wanted}: the map of {self.source} has no such thing; ask for one of its things")
+            raise self.no_such_thing(wanted)
         return own
+
+    def no_such_thing(self, wanted: str) -> UserError:
+        """What is said of an id that no thing has: which ids there are."""
+        ids = [thing.id for thing in self.things]
+        more = f" and {len(ids) - LISTED} more" if len(ids) > LISTED else ""
+        known = f"it has {', '.join(ids[:LISTED])}{more}" if ids else "it has none"
+        return UserError(f"{wanted}: the map of {self.source} has no such thing; {known}")

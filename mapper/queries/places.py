@@ -58,8 +58,8 @@ class PlaceQuestions(NameQuestions):
         if called is not None:
             inside = self._inside(where, called, min_probability)
         elif isinstance(where, Polygon):
-            probable = self.index.probable(self._labels(label), min_probability)
-            inside = self._inside(where, probable, min_probability)
+            near = self.index.over(where, self.R_world_upright, self._labels(label), min_probability)
+            inside = self._inside(where, near, min_probability)
         else:
             inside = self.index.within(where, self._labels(label), min_probability)
         answers = [Answer(thing, probability) for thing, probability in inside]

@@ -9,11 +9,13 @@ import numpy as np
 from ...datasets.errors import UserError
 from ..map.thing import Thing
 from .answer import PROBABLE, Answer
+from .level_surfaces import LevelSurface
 from .names import NameQuestions
 from .relation_boxes import Pairs, UprightBoxes, upright_boxes
 from .relation_candidates import Near, candidate_pairs
 from .relation_places import gaps, is_beside, is_inside, is_under
 from .relation_support import Support, carried_by, supports
+from .table_tops import means_table, table_tops, with_table_tops
 
 MEANT = 0.05  # belief in a label from which on a thing may be the one that a question means
 
@@ -33,6 +35,9 @@ class RelationQuestions(NameQuestions):
             one thing that may be the answer; None for anything.
         min_probability: of an answer.
     and raises `UserError` where the map has no such thing as `which`, or does not know `label`.
+
+    Where nothing in the map is a table, "the table" of `on`, `under` and `next_to` is any level surface of the cloud at
+    a table's height (`table_tops`), the probability being that of the relation to one of those.
     """
 
     __slots__ = ()
@@ -40,7 +45,7 @@ class RelationQuestions(NameQuestions):
     def on(self, which: Thing | str, label: str | None = None, min_probability: float = PROBABLE) -> list[Answer]:
         """Things that rest on `which`, touching it; what stands on a book on the table is on the book. Definition and
         equations: `relation_support`."""
-        return self._related(which, label, min_probability, _carried)
+        return self._related(which, label, min_probability, _carried, self.table_tops(which))
 
     def supports_of(
         self, which: Thing | str, label: str | None = None, min_probability: float = PROBABLE
@@ -55,7 +60,8 @@ class RelationQuestions(NameQuestions):
 
     def under(self, which: Thing | str, label: str | None = None, min_probability: float = PROBABLE) -> list[Answer]:
         """Things below `which`, whether or not they touch it; below the top of what stands on legs (`is_under`)."""
-        return self._related(which, label, min_probability, _placed(is_under, Near.ABOVE_OR_BELOW))
+        relation, tops = _placed(is_under, Near.ABOVE_OR_BELOW), self.table_tops(which)
+        return self._related(which, label, min_probability, relation, tops)
 
     def next_to(
         self,
@@ -72,7 +78,8 @@ class RelationQuestions(NameQuestions):
         def beside(pairs: Pairs) -> np.ndarray:
             return is_beside(pairs, reach)
 
-        return self._related(which, label, min_probability, _placed(beside, Near.BESIDE, reach), with_gaps=True)
+        relation, tops = _placed(beside, Near.BESIDE, reach), self.table_tops(which)
+        return self._related(which, label, min_probability, relation, tops, with_gaps=True)
 
     def _related(
         self,
@@ -80,10 +87,15 @@ class RelationQuestions(NameQuestions):
         label: str | None,
         min_probability: float,
         relation: Callable[[UprightBoxes, np.ndarray], Support],
+        tops: tuple[LevelSurface, ...] = (),
         with_gaps: bool = False,
     ) -> list[Answer]:
         boxes = upright_boxes(self.things, self.up)
-        meant = self._meant(which)
+        if tops:
+            boxes = with_table_tops(boxes, tops)
+            meant = dict.fromkeys(range(len(self.things), len(boxes)), 1.0)
+        else:
+            meant = self._meant(which)
         found = relation(boxes, np.array(sorted(meant), dtype=np.intp))
         share = np.array([meant[int(b)] for b in found.second])
         if label is not None and not self.called(label):
@@ -91,12 +103,18 @@ class RelationQuestions(NameQuestions):
         belief = self.belief_of(label)
         probability = _of_any(found, share, len(boxes), exclusive=relation is _carried)
         answers = []
-        for i in np.flatnonzero(probability > 0.0):
+        for i in np.flatnonzero(probability[: len(self.things)] > 0.0):
             thing = self.things[i]
             p = float(probability[i]) * belief(thing) / thing.existence
             if p >= min_probability and p > 0.0:
                 answers.append(Answer(thing, p, *(_gap(boxes, found, int(i)) if with_gaps else (None, None))))
         return sorted(answers, key=lambda answer: (-answer.probability, answer.thing.id))
+
+    def table_tops(self, which: Thing | str) -> tuple[LevelSurface, ...]:
+        """The surfaces that `which` is taken as, upright frame: none unless it means a table and no thing is one."""
+        if not isinstance(which, str) or self.cloud is None or not means_table(which):
+            return ()
+        return () if self.called(which) or self.find(which, MEANT) else table_tops(self)
 
     def _meant(self, which: Thing | str) -> dict[int, float]:
         """Place among the things -> P(it is what `which` means | it exists), for those that it may mean."""

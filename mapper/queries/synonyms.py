@@ -30,11 +30,13 @@ class Synonyms:
         groups: each a set of phrases for the same things.
         flat_topped: phrases for what is hollow below a flat top, groups written out.
         on_floor: phrases for what stands on the floor, groups written out.
+        table_tops: phrases for a level surface at a table's height, groups written out.
     """
 
     groups: tuple[frozenset[Words], ...]
     flat_topped: frozenset[Words]
     on_floor: frozenset[Words]
+    table_tops: frozenset[Words]
 
     def of(self, words: Words) -> frozenset[Words]:
         """All phrases in the groups that hold a phrase, and that phrase."""
@@ -46,7 +48,8 @@ def synonyms() -> Synonyms:
     """The file's content, read once."""
     document = yaml.safe_load(FILE.read_text(encoding="utf-8"))
     groups = tuple(frozenset(map(normal_words, group)) for group in document["groups"])
-    return Synonyms(groups, *(_with_synonyms(groups, document[name]) for name in ("flat_topped", "on_floor")))
+    lists = ("flat_topped", "on_floor", "table_tops")
+    return Synonyms(groups, *(_with_synonyms(groups, document[name]) for name in lists))
 
 
 def _with_synonyms(groups: tuple[frozenset[Words], ...], names: Iterable[str]) -> frozenset[Words]:

@@ -7,9 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from sample_maps import GIVEN_POSES, feed
+from typer.testing import CliRunner
 
 from thingmap.datasets.errors import InputError
 from thingmap.detectors.detections import Detections
+from thingmap.detectors.recorded.thingmap_json import write_detections
+from thingmap.mapper.cli.main import app
 from thingmap.mapper.edits.editor import MapEditor
 from thingmap.mapper.map.appearance import Appearance
 from thingmap.mapper.map.object_map import ObjectMap
@@ -46,6 +49,34 @@ def test_things_look_as_their_detections(mapper_class, sample_frames, seen):
         assert 1 <= thing.appearance.read().views <= len(sample_frames)
     looks_right = [t.embedding[object_map.classes.index(t.label)] > 0.9 for t in object_map.things]
     assert np.mean(looks_right) > 0.9
+
+
+def test_what_a_detector_saw_is_found_by_words_after_a_run(tmp_path, sample_frames, seen):
+    """Embeddings in a file of detections, a run of the command, the map read again, and a text encoder."""
+    names = [frame.name for frame in sample_frames]
+    file, classes = tmp_path / "seen.json", seen[0].classes
+    write_detections(file, classes, zip(names, seen, strict=True))
+    arguments = [
+        "run",
+        "sample:tabletop?frames=80&width=320",
+        "--detector",
+        f"recorded:{file}",
+        "-o",
+        str(tmp_path / "out"),
+    ]
+    options = ["--stride", "4", "--odometry", "poses"]
+    result = CliRunner().invoke(app, [*arguments, *options])
+    assert result.exit_code == 0, result.output
+    object_map = ObjectMap.load(tmp_path / "out")
+    meant = {"something to drink from": "cup", "breakfast in a carton": "cereal box"}
+
+    def encoder(text: str) -> np.ndarray:
+        return look(len(classes), classes.index(meant[text]))
+
+    for text, label in meant.items():
+        answers = object_map.find(text, 0.1, encoder=encoder)
+        assert answers and {answer.thing.label for answer in answers} == {label}
+        assert sum(answer.probability for answer in answers) <= 1.0
 
 
 def test_detections_without_embeddings_make_things_without(sample_frames, sample_detections):

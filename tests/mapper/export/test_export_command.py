@@ -76,5 +76,5 @@ def test_formats_are_listed():
     assert result.exit_code == 0
     lines = {line.split()[0]: line for line in result.stdout.splitlines()}
     assert len(lines) == 14
-    assert 'pip install "thingmap[usd]"' in lines["usd"] and "--min-visibility" in lines["coco"]
+    assert "needs the extra usd" in lines["usd"] and "--min-visibility" in lines["coco"]
     assert "reads the sequence" in lines["coco"] and "--say" not in result.stdout

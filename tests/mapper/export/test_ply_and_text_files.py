@@ -50,6 +50,9 @@ def test_csv_has_a_row_for_every_thing(cup_and_book, tmp_path):
     )
     assert (first["second_label"], float(first["second_probability"])) == ("bowl", pytest.approx(0.1))
     assert (first["supporting"], first["occluded"], first["contradicting"]) == ("12", "3", "1")
+    pandas = pytest.importorskip("pandas")
+    table = pandas.read_csv(file)
+    assert table["label"].tolist() == ["cup", "bücher,\nlarge"] and table["size_x"].dtype == np.float64
 
 
 def test_csv_without_a_second_label(tmp_path, make_thing, make_map):

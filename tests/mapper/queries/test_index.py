@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
+from thingmap.mapper.map.polygon import Polygon
 from thingmap.mapper.map.region import Ball, Box, probability_inside
 from thingmap.mapper.queries.index import ThingIndex
 from thingmap.mapper.queries.inside_bounds import inside_bounds
@@ -95,6 +97,27 @@ def test_things_within_a_region(make_thing, data, label, least, region):
         if thing.id in found:
             assert found[thing.id] == pytest.approx(exact, abs=0.004) and found[thing.id] >= least
     assert set(found) <= {thing.id for thing, _ in asked_for(things, label, least)}
+
+
+@given(
+    data=st.data(),
+    least=probabilities,
+    place=st.tuples(coordinates, coordinates),
+    size=st.floats(0.1, 3.0),
+    heights=st.sampled_from([(-np.inf, np.inf), (-0.5, 0.7)]),
+    turn=st.sampled_from([0.0, 0.4, 2.0]),
+)
+@settings(max_examples=100, deadline=None)
+def test_nothing_over_a_polygon_is_left_out(make_thing, data, least, place, size, heights, turn):
+    things = data.draw(scenes(make_thing))
+    polygon = Polygon(np.array([[0.0, 0.0], [size, 0.0], [0.0, size]]) + place, *heights)
+    R = Rotation.from_rotvec([turn, 0.3 * turn, 0.0]).as_matrix()
+    found = {thing.id: p for thing, p in ThingIndex(things).over(polygon, R, None, least)}
+    for thing, p in asked_for(things, None, least):
+        inside = probability_inside(polygon, R.T @ thing.position, R.T @ thing.position_covariance @ R)
+        if p * inside >= least + 0.004:
+            assert found[thing.id] == p
+    assert found.items() <= {thing.id: p for thing, p in asked_for(things, None, least)}.items()
 
 
 @given(data=st.data(), least=probabilities)
