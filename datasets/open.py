@@ -110,6 +110,9 @@ def _choose(path: Path, dataset: str | None) -> tuple[Loader, Path]:
         raise InputError(path, "one sequence", found + more, "give one of these folders, and its dataset if need be")
     if dataset == "folder":
         return loaders[0], path  # its own errors say which part is missing
+    if (path / "map.json").is_file():
+        remedy = "`thingmap query`, `view` and `info` read maps; give the folder that holds a sequence"
+        raise InputError(path, "a sequence", "the map that a run wrote", remedy)
     looked_for = "; or ".join(f"{loader.layout} ({loader.dataset})" for loader in loaders)
     raise InputError(path, looked_for, contents(path), "give the folder that holds a sequence")
 

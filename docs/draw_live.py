@@ -26,6 +26,7 @@ import cv2
 import numpy as np
 
 from thingmap.datasets.errors import InputError, UserError
+from thingmap.datasets.extras import install_command
 from thingmap.mapper.map.atomic import write_atomic
 
 SIZE = (1600, 1000)  # pixels
@@ -74,7 +75,7 @@ def _viewer() -> str:
     beside = Path(sys.executable).with_name("rerun")
     program = str(beside) if beside.is_file() else shutil.which("rerun")
     if program is None:
-        raise UserError('rerun: the program was not found; install it with pip install "thingmap[view]"')
+        raise UserError(f"rerun: the program was not found; install it with: {install_command('view')}")
     return program
 
 

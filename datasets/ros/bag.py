@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, UserError
+from ..extras import install_command
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
@@ -160,7 +161,7 @@ def _open_reader(path: Path) -> AnyReader:
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
-        raise UserError(f'{path}: reading bags needs rosbags; install it with: pip install "thingmap[ros]"') from None
+        raise UserError(f"{path}: reading bags needs rosbags; install it with: {install_command('ros')}") from None
     try:
         # ROS 2 recorded no definitions of messages before Iron; those of images did not change since
         reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))

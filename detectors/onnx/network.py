@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 
 from ...datasets.errors import InputError, UserError
+from ...datasets.extras import install_command
 
 
 class Backend(Enum):
@@ -36,7 +37,7 @@ def load_network(path: Path, backend: Backend) -> Network:
     """
     installed = find_spec("onnxruntime") is not None
     if backend is Backend.ONNXRUNTIME and not installed:
-        remedy = "pip install 'thingmap[onnxruntime]', or use backend=opencv"
+        remedy = f"install it with: {install_command('onnxruntime')}, or use backend=opencv"
         raise UserError(f"backend onnxruntime is not installed; {remedy}")
     if backend is Backend.OPENCV or not installed:
         return OpenCvNetwork(path)

@@ -93,7 +93,7 @@ def format_lines() -> list[str]:
 
 def _about(one: ExportFormat) -> str:
     needs = [] if one.needs is None else [f"reads {one.needs}"]
-    needs += [] if one.extra is None else [f'needs pip install "thingmap[{one.extra}]"']
+    needs += [] if one.extra is None else [f"needs the extra {one.extra}"]
     options = [_spelled(name) for name in one.options if name != "say"]
     needs += [f"options {' '.join(options)}"] if options else []
     return f"{one.help}; {', '.join([' '.join(one.endings), *needs])}"

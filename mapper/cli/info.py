@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ...datasets.lidar import LidarScan
     from ...datasets.sequence import Sequence
     from ..map.object_map import ObjectMap
+    from ..map.thing import Thing
 
 Line = tuple[str, str]  # what, and its value
 TRIED = 50  # frames, in search of the first that can be used
@@ -34,12 +35,16 @@ def info(
     from ...datasets.open import open_sequence
     from ...datasets.ros.bag import SUFFIXES
     from ..map.map_file import FILE_NAME, SCHEMA
+    from ..map.object_map import ObjectMap
+    from .tables import print_things
 
     place = Path(path)
-    if (place / FILE_NAME).is_file():
-        lines = [*_map_lines(place), *_report_lines(place)]
+    things: tuple[Thing, ...] = ()
+    if (place / FILE_NAME).is_file() or (place.is_file() and _schema(place) == SCHEMA):
+        object_map = ObjectMap.load(place)
+        lines, things = [*_map_lines(object_map), *_report_lines(place)], object_map.things
     elif place.is_file() and place.suffix.lower() not in SUFFIXES:
-        lines = list(_map_lines(place)) if _schema(place) == SCHEMA else list(_detections_lines(place))
+        lines = list(_detections_lines(place))
     else:
         for line in _topic_lines(path):  # first: they are wanted most where the sequence cannot be opened
             typer.echo(line)
@@ -48,9 +53,14 @@ def info(
     width = max(len(what) for what, _ in lines)
     for what, value in lines:
         typer.echo(f"{what:<{width}}  {value}")
+    if things:
+        typer.echo()
+        print_things(things)
 
 
 def _schema(file: Path) -> object:
+    if file.suffix.lower() != ".json":
+        return None
     try:
         document = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -180,10 +190,7 @@ def _scan(scan: LidarScan) -> str:
     return f"{len(scan.points)} points, {low:.2f} to {high:.2f} m (1 to 99 %), median {middle:.2f} m, {timed}"
 
 
-def _map_lines(path: Path) -> Iterator[Line]:
-    from ..map.object_map import ObjectMap
-
-    object_map = ObjectMap.load(path)
+def _map_lines(object_map: ObjectMap) -> Iterator[Line]:
     yield "map of", object_map.source
     yield "frame", str(object_map.frame)
     yield "up", _up(object_map)

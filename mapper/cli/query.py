@@ -21,10 +21,12 @@ Centre = tuple[float, float, float, float]
 
 def query(
     folder: Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `thingmap run` wrote, or a map.json.")],
-    label: Annotated[
-        str | None,
+    words: Annotated[
+        list[str] | None,
         typer.Argument(
-            metavar="LABEL", help='A label, the name or the id of a thing, or a question: "what is on the table?".'
+            metavar="LABEL",
+            help='A label, the name or the id of a thing, or a question: "what is on the table?".',
+            show_default=False,
         ),
     ] = None,
     near: Annotated[
@@ -101,6 +103,7 @@ def query(
         **{Kind.EXPECTED: expected_at, Kind.LOOK: where_to_look},
     }
     asked = {kind: value for kind, value in options.items() if value is not None}
+    label = " ".join(words) if words else None  # a question is understood without quotes, too
     object_map = ObjectMap.load(folder)
     question = question_of(label, asked, near, min_probability, object_map)
     note = remark(question, object_map)

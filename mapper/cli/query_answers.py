@@ -78,7 +78,7 @@ def print_last_views(views: Sequence[LastView]) -> None:
             )
         )
     headers = ("last seen, s", "frame", "camera x, y, z, m", "distance, m", "found as", "visible", "P(asked for)")
-    print_table((*headers, "likeliest label", "id"), rows)
+    print_table((*headers, "label", "id"), rows)
 
 
 def print_sightings(sightings: Sequence[Sighting | ExpectedDetection], head: str) -> None:
@@ -90,7 +90,7 @@ def print_sightings(sightings: Sequence[Sighting | ExpectedDetection], head: str
         sides = "  ".join(f"{side:.0f}{error}" for side, error in zip(sighting.xyxy, errors, strict=True))
         cells = probability_text(sighting.probability), sighting.thing.label, f"{sighting.share:.2f}"
         rows.append((*cells, sides, sighting.thing.id))
-    print_table((head, "likeliest label", "visible", "box x, y, x, y, px", "id"), rows)
+    print_table((head, "label", "visible", "box x, y, x, y, px", "id"), rows)
 
 
 def print_viewpoints(viewpoints: Sequence[Viewpoint]) -> None:

@@ -64,6 +64,7 @@ PATTERNS: tuple[tuple[str, Kind], ...] = (
     (rf"(?:when|where) (?:was|were) {THE}(?P<x>.+?) (?:last seen|seen last)", Kind.LAST_SEEN),
     (rf"where (?:should i|to|do i|must i) look for {THE}(?P<x>.+)", Kind.LOOK),
     (rf"where {ARE} {THE}(?P<x>.+)", Kind.FIND),
+    (rf"{ARE} there (?:any )?{THE}(?P<x>.+)", Kind.FIND),
     (rf"(?:find|show|show me) {THE}(?P<x>.+)", Kind.FIND),
     (rf"what (?:do|does) {THE}(?P<x>.+?) {STANDS} on", Kind.SUPPORTS),
     (rf"what {ARE} {THE}(?P<x>.+?)(?: {STANDS})? on", Kind.SUPPORTS),

@@ -38,7 +38,8 @@ def choose_detector(spec: str | None, source: str, sequence: Sequence) -> str:
     if recorded.is_file():
         return f"recorded:{recorded}"
     raise UserError(
-        f"{source}: no detector: give --detector (recorded:FILE for boxes you have, onnx:MODEL for a network), "
+        f"{source}: no detector: give --detector (onnx:MODEL for a network, proposals for whatever stands on "
+        "tables and floors, recorded:FILE for boxes you have), "
         "or put a detections.json into the sequence's folder"
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from collections.abc import Iterable, Sequence
 from textwrap import indent
 from typing import TYPE_CHECKING
@@ -14,9 +15,11 @@ if TYPE_CHECKING:
     from ..map.thing import Thing
     from ..queries.answer import Answer
 
+GAP = 2  # columns between two cells
 WIDTH = 1000  # columns: a row stays one line, whatever the terminal or the file
 EXPLAINED_WIDTH = 100  # columns where the output is no terminal
 INDENT = "  "
+SPARE = ("for/hidden/against", "P", "existence", "size, m")  # left out in this order where a terminal is too narrow
 LARGEST = 40  # things shown after a run
 
 
@@ -35,7 +38,7 @@ def print_answers(answers: Sequence[Answer]) -> None:
     """Answers to a question, in their order; the first column is the probability of being what was asked for."""
     with_distance = any(answer.distance is not None for answer in answers)
     headers = ("P(asked for)", *(("distance ± std, m",) if with_distance else ()))
-    headers += ("likeliest label", "P", "existence", "x, y, z ± std, m", "size, m", "for/hidden/against", "id")
+    headers += ("label", "P", "existence", "x, y, z ± std, m", "size, m", "for/hidden/against", "id")
     rows = []
     for answer in answers:
         distance = (f"{answer.distance:.3f} ± {answer.distance_std:.3f}",) if with_distance else ()
@@ -63,15 +66,34 @@ def _thing_cells(thing: Thing) -> tuple[str, ...]:
 
 
 def print_table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Rows of cells under heads; what is in a cell is shown as it is."""
+    """Rows of cells under heads; what is in a cell is shown as it is.
+
+    A row stays one line. Where the output is a terminal too narrow for it, `SPARE` columns are left out, and named.
+    """
     from rich import box
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1), show_edge=False)
-    for header in headers:
-        table.add_column(header)
+    rows = list(rows)
+    kept = _fitting(headers, rows) if sys.stdout.isatty() else list(range(len(headers)))
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
+    for k in kept:
+        table.add_column(headers[k])
     for row in rows:
-        table.add_row(*(Text(cell) for cell in row))  # Text: a label may hold what rich takes for markup
+        table.add_row(*(Text(row[k]) for k in kept))  # Text: a label may hold what rich takes for markup
     Console(width=WIDTH).print(table)
+    if len(kept) < len(headers):
+        missing = "; ".join(header for k, header in enumerate(headers) if k not in kept)
+        print(f"left out, as the terminal is narrow: {missing}")
+
+
+def _fitting(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> list[int]:
+    """Which columns to show in this terminal: all that are not `SPARE`, and of these as many as there is room for."""
+    widths = [max(len(row[k]) for row in (headers, *rows)) + GAP for k in range(len(headers))]
+    kept = list(range(len(headers)))
+    for header in SPARE:
+        if sum(widths[k] for k in kept) - 1 <= shutil.get_terminal_size().columns:
+            break
+        kept = [k for k in kept if headers[k] != header]
+    return kept

@@ -32,7 +32,7 @@ class ExportFormat:
         function: "module:function" that writes it; modules below this package, or below the mapper with "..".
         options: keyword arguments of that function.
         counts: what it returns the number of.
-        extra: of `pip install "thingmap[EXTRA]"`, where it needs one.
+        extra: of thingmap that has to be installed, where it needs one.
         needs: what it reads besides OUT.
     """
 

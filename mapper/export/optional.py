@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import Any
 
 from ...datasets.errors import UserError
+from ...datasets.extras import install_command
 
 
 def optional_module(name: str, package: str, extra: str) -> Any:
@@ -17,4 +18,4 @@ def optional_module(name: str, package: str, extra: str) -> Any:
     try:
         return import_module(name)
     except ImportError:
-        raise UserError(f'{package} is not installed; run `pip install "thingmap[{extra}]"`') from None
+        raise UserError(f"{package} is not installed; install it with: {install_command(extra)}") from None

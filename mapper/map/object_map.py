@@ -131,7 +131,7 @@ class ObjectMap(PlaceQuestions, LastViewQuestions, SightQuestions):
                 f"{wanted}: {gone.who} deleted it on {gone.when}{why}; undo that with "
                 f"`thingmap edit OUT undo {gone.number}`"
             )
-        raise UserError(f"{wanted}: the map of {self.source} has no such thing; ask for one of its things")
+        raise self.no_such_thing(wanted)
 
     @property
     def R_world_upright(self) -> np.ndarray:

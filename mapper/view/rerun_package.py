@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from ...datasets.errors import UserError
+from ...datasets.extras import install_command
 
-EXTRA = 'pip install "thingmap[view]"'
+EXTRA = "view"
 APPLICATION = "thingmap"
 
 
@@ -20,10 +21,11 @@ def import_rerun() -> Any:
         import rerun
         import rerun.blueprint
     except ImportError as error:
-        raise UserError(f"the live view needs rerun ({error}); install it with {EXTRA}") from None
+        raise UserError(f"the live view needs rerun ({error}); install it with: {install_command(EXTRA)}") from None
     if not hasattr(rerun, "GrpcServerSink"):
         version = getattr(rerun, "__version__", "another package of that name")
-        raise UserError(f"the live view needs a newer rerun-sdk, found {version}; install it with {EXTRA}")
+        remedy = f"install it with: {install_command(EXTRA)}"
+        raise UserError(f"the live view needs a newer rerun-sdk, found {version}; {remedy}")
     return rerun
 
 

@@ -76,6 +76,12 @@ def test_where_nothing_is_recognised_everything_looked_for_is_listed(tmp_path: P
         open_sequence(tmp_path)
 
 
+def test_a_map_is_no_sequence_and_is_told_so(tmp_path: Path) -> None:
+    (tmp_path / "map.json").write_text("{}")
+    with pytest.raises(InputError, match="found the map that a run wrote; `thingmap query`"):
+        open_sequence(tmp_path)
+
+
 def test_only_the_named_dataset_is_looked_for(recordings: Path) -> None:
     with pytest.raises(InputError) as error:
         open_sequence(recordings / "folder", "7scenes")

@@ -112,8 +112,10 @@ def test_export_writes_a_new_file(thingmap, out, tmp_path):
 
 
 def test_info_of_a_map(thingmap, out):
-    lines = dict(line.split("  ", 1) for line in thingmap("info", out).stdout.splitlines())
+    shown, things = thingmap("info", out).stdout.split("\n\n")
+    lines = dict(line.split("  ", 1) for line in shown.splitlines())
     values = {key: value.strip() for key, value in lines.items()}
+    assert things.startswith("label") and things.count("thing-000") == 3
     assert values["map of"] == "table" and values["frame"] == "first camera"
     assert values["things"] == "3: 2 cup, 1 bowl"
     assert values["up"].startswith("0.000, -1.000, 0.000 ± 1.1 degrees, from planes") or "-1.000" in values["up"]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import InputError, UserError
+from ...extras import install_command
 from ..mesh import Mesh
 from .objects import Part
 from .scan_normals import corner_normals
@@ -51,7 +52,8 @@ def _meshes(path: Path) -> Iterator[tuple[trimesh.Trimesh, np.ndarray]]:
         from PIL import Image  # noqa: F401  trimesh says nothing where it is missing and drops the textures
     except ImportError as error:
         raise UserError(
-            f"{path}: expected the packages that read meshes, found none ({error}); pip install 'thingmap[meshes]'"
+            f"{path}: expected the packages that read meshes, found none ({error}); "
+            f"install them with: {install_command('meshes')}"
         ) from None
     try:
         scene = trimesh.load_scene(path, process=False)

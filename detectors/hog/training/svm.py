@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ....datasets.errors import UserError
+from ....datasets.extras import install_command
 
 BIAS_SCALE = 10  # liblinear shrinks the bias like a weight; on a column of tens that is next to nothing
 TOLERANCE = 1e-3  # of the gradient, relative: hard negatives move the weights by far more from round to round
@@ -19,7 +20,7 @@ def check_installed() -> None:
     try:
         import sklearn.svm  # noqa: F401
     except ImportError:
-        raise UserError("training needs scikit-learn; install it with: pip install 'thingmap[train]'") from None
+        raise UserError(f"training needs scikit-learn; install it with: {install_command('train')}") from None
 
 
 def fit_svm(positives: np.ndarray, negatives: np.ndarray, cost: float) -> tuple[np.ndarray, float]:

@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from thingmap.mapper.cli.main import app
 from thingmap.mapper.cli.query_sentence import FORMS, Kind, parse_sentence
+from thingmap.mapper.cli.tables import print_table
 from thingmap.mapper.edits.editor import MapEditor
 from thingmap.mapper.map.store import OutputFolder
 from thingmap.mapper.map.up_direction import UpDirection
@@ -123,6 +124,15 @@ def test_how_words_were_taken_is_said_beside_the_answer(ask):
     assert ask("mug").stderr == ""
 
 
+def test_a_table_that_nobody_named_is_told_by_the_cloud(ask, tmp_path):
+    grid = np.stack(np.meshgrid(np.arange(2.6, 3.4, 0.02), np.arange(0.6, 1.4, 0.02), [0.0]), axis=-1).reshape(-1, 3)
+    OutputFolder(tmp_path / "out").write_cloud(grid, np.full(grid.shape, 128, dtype=np.uint8))
+    result = ask("what is on the worktop?", "--json")
+    assert ids(result) == ["thing-0004"]
+    assert result.stderr == "no worktop in the map: taken as the level surface as high as a table in its cloud\n"
+    assert ask("--on", "table").stderr == ""  # the map has one
+
+
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
@@ -140,7 +150,7 @@ def test_how_words_were_taken_is_said_beside_the_answer(ask):
         (["mug", "--last-seen", "book"], "takes no LABEL"),
         (["--last-seen", "mug", "--why"], "--why"),
         (["what colour is the mug?"], "where is X?"),
-        (["thing-0077"], "no such thing"),
+        (["thing-0077"], "no such thing; it has thing-0001, thing-0002"),
         (["--where-to-look", "thing-0077"], "no such thing"),
         (["--visible-from", "up there"], "tx ty tz qx qy qz qw"),
         (["--expected-at", "77"], "no pose at 77 s; its stamps go from 0.000 to 0.100"),
@@ -149,6 +159,25 @@ def test_how_words_were_taken_is_said_beside_the_answer(ask):
 )
 def test_mistakes_are_one_line(ask, arguments, part):
     assert_mistake(ask(*arguments), part)
+
+
+def test_a_question_needs_no_quotes_and_may_ask_whether_there_is_one(ask):
+    for words in (["where", "is", "the", "mug?"], ["is there a mug?"], ["are there any mugs"]):
+        assert ids(ask(*words, "--json")) == ["thing-0002"]
+
+
+def test_a_narrow_terminal_gets_fewer_columns_and_is_told(capsys, monkeypatch):
+    headers, rows = ("label", "P", "size, m", "for/hidden/against", "id"), [("mug", "0.99", "1", "1/0/0", "thing-0001")]
+    print_table(headers, rows)
+    whole = capsys.readouterr().out
+    assert all(header in whole for header in headers) and "left out" not in whole
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    monkeypatch.setenv("COLUMNS", "33")
+    print_table(headers, rows)
+    shown, said = capsys.readouterr().out.strip().rsplit("\n", 1)
+    _, line, row = shown.splitlines()
+    assert len(line) <= 33 and row.split() == ["mug", "0.99", "1", "thing-0001"]
+    assert said == "left out, as the terminal is narrow: for/hidden/against"
 
 
 def test_every_form_is_understood():
