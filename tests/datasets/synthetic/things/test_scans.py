@@ -266,7 +266,7 @@ def test_a_missing_package_is_told_with_the_extra_that_brings_it(tmp_path, monke
         return real(name, *args, **kwargs)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(UserError, match=r"thingmap\[meshes\]"):
+    with pytest.raises(UserError, match=r"\[meshes\]"):
         load_scans(tmp_path)
 
 

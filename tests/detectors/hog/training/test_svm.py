@@ -31,5 +31,5 @@ def test_two_points_are_parted_in_the_middle():
 
 def test_without_scikit_learn_the_remedy_is_said(monkeypatch):
     monkeypatch.setitem(sys.modules, "sklearn.svm", None)
-    with pytest.raises(UserError, match=r"thingmap\[train\]"):
+    with pytest.raises(UserError, match=r"\[train\]"):
         check_installed()
