@@ -152,13 +152,6 @@ def log(ctx: typer.Context) -> None:
         typer.echo(f"{entry.number:4d}  {entry.when}  {entry.who}: {state}{entry}{about}{reason}")
 
 
-def pending_lines(folder: Path) -> list[str]:
-    """A line for every edit that does not find its thing in the map there, for those who have just mapped anew."""
-    from ..map.object_map import ObjectMap
-
-    return [str(pending) for pending in ObjectMap.load(folder).edits.pending]
-
-
 def _editor(ctx: typer.Context, who: str | None) -> MapEditor:
     from ..edits.editor import MapEditor
 

@@ -77,11 +77,6 @@ class ThingIndex:
         answers = (Answer(self._things[row], p) for row, p in known if p > 0.0)
         return tuple(sorted(answers, key=lambda answer: (-answer.probability, answer.thing.id)))
 
-    def probable(self, label: Labels, min_probability: float) -> list[tuple[Thing, float]]:
-        """All things that are what was asked for, with that probability; arguments as for `near`."""
-        asked = self._asked(label, min_probability)
-        return self._with_probability(asked, np.arange(len(asked.rows)))
-
     def near(
         self, origin: np.ndarray, label: Labels, count: int | None, min_probability: float
     ) -> list[tuple[Thing, float]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 from typer.testing import CliRunner
 
-from thingmap.mapper.cli.edit import pending_lines
 from thingmap.mapper.cli.main import app
 from thingmap.mapper.map.object_map import ObjectMap
 from thingmap.mapper.map.store import OutputFolder
@@ -16,6 +15,10 @@ def out(tmp_path, make_thing, make_map):
     folder = OutputFolder.create(tmp_path / "out")
     folder.write_map(make_map(make_thing(1), make_thing(2), make_thing(3, "bowl", position=[2, 0, 1])))
     return folder.path
+
+
+def pending_in(out) -> list[str]:
+    return [str(pending) for pending in ObjectMap.load(out).edits.pending]
 
 
 @pytest.fixture
@@ -75,9 +78,9 @@ def test_mistakes_are_one_line(edit, arguments, message):
 
 
 def test_what_waits_is_told_after_mapping_anew(out, edit, make_map, make_thing):
-    assert edit("log").stdout == "nothing was edited\n" and pending_lines(out) == []
+    assert edit("log").stdout == "nothing was edited\n" and pending_in(out) == []
     edit("relabel", "thing-0003", "plate", "--who", "Ann")
     OutputFolder.create(out, overwrite=True).write_map(make_map(make_thing(1)))
-    (line,) = pending_lines(out)
+    (line,) = pending_in(out)
     assert line.startswith("edit 1 waits (relabel thing-0003 from bowl to plate")
     assert "[waits]" in edit("log").stdout

@@ -177,5 +177,5 @@ def test_a_map_makes_its_index_once_and_a_changed_map_another(make_map, make_thi
 def test_groups_that_were_not_asked_for_long_are_forgotten(make_thing):
     index = ThingIndex([make_thing(k) for k in range(5)])
     for k in range(300):
-        assert len(index.probable("cup", 0.001 * (k + 1))) == 5
+        assert len(index.near(np.zeros(3), "cup", None, 0.001 * (k + 1))) == 5
     assert len(index._groups) <= 32
