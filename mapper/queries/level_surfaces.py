@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 CELL = 2.0  # of the points' spacing: so wide that a surface has a point in every cell of it
 CLEAR = 2  # cells: a wall has points so far above or below each of its own, a level surface at most where things stand
@@ -80,6 +77,9 @@ def _patches(cells: np.ndarray, wide: int, high: int) -> np.ndarray:
             first.append(np.flatnonzero(there))
             second.append(at[there])
     a, b = np.concatenate(first), np.concatenate(second)
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
     return connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(len(cells),) * 2), directed=False)[1]
 
 
@@ -101,6 +101,8 @@ def _surface(points: np.ndarray, area: float, spacing: float) -> LevelSurface | 
     spread = MEDIAN_TO_STD * float(np.median(np.abs(points[:, 2] - height)))
     if spread > SPREAD:
         return None
+    import cv2
+
     centre, extents, degrees = cv2.minAreaRect(np.ascontiguousarray(points[:, :2], dtype=np.float32))
     # points stand for cells of the cloud's own size, whose heights are even within them
     std = float(np.hypot(spread, spacing / np.sqrt(12.0)))

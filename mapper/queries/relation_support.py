@@ -25,7 +25,6 @@ import numpy as np
 from .relation_boxes import Pairs, UprightBoxes
 from .relation_candidates import Near, candidate_pairs
 from .relation_draws import draw
-from .relation_kernels import contact_density
 from .relation_places import is_inside
 
 CONTACT_STD = 0.01  # m: how far boxes of touching things are apart; half a voxel of the map's cloud (`MapperConfig`)
@@ -75,4 +74,6 @@ def carried_by(boxes: UprightBoxes, second: np.ndarray) -> Support:
 
 def contact_weight(pairs: Pairs) -> np.ndarray:
     """(P,) w_b of every pair, 1 / metres."""
+    from .relation_kernels import contact_density  # brings numba
+
     return contact_density(draw(pairs), CONTACT_STD)
