@@ -119,7 +119,7 @@ class LabelJob:
         with clock.stage("instances"):
             instances = find(voxels, labels, run.object_map, self.config) if find else None
         with clock.stage("writing"):
-            points = write_labelling(self.folder, run.object_map, voxels, labels.label, instances)
+            points = write_labelling(self.folder, run.object_map, voxels, labels, instances)
         found = {"points": points, "labels": labels, "instances": instances}
         return replace(report, seconds=_totals(clock), voxels=len(voxels.points), **found)
 

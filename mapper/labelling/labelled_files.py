@@ -12,10 +12,12 @@ from ...datasets.errors import InputError
 from ...datasets.truth import NO_OBJECT
 from ..export.colors import class_color
 from ..map.atomic import write_atomic
+from ..map.labels_file import PointLabels
 from ..map.map_to_document import format_document
 from ..map.object_map import ObjectMap
 from ..map.store import AGAIN, OutputFolder
 from .instances import Instances, ThingPoints
+from .labelling import Labels
 from .voxels import Voxels
 
 BACKGROUND = "background"
@@ -37,7 +39,7 @@ def read_volumes(folder: OutputFolder) -> ObjectMap:
 
 
 def write_labelling(
-    folder: OutputFolder, object_map: ObjectMap, voxels: Voxels, label: np.ndarray, instances: Instances | None
+    folder: OutputFolder, object_map: ObjectMap, voxels: Voxels, labels: Labels, instances: Instances | None
 ) -> dict[str, int]:
     """Write labels.ply and add counts to map.json; returns class -> number of points, the background's last.
 
@@ -45,13 +47,15 @@ def write_labelling(
         folder: of the run.
         object_map: its map.
         voxels: N, a point each.
-        label: (N,) indices into the map's classes, `NO_OBJECT` for background.
+        labels: of the N points.
         instances: whose the points are; None where nobody knows.
     """
+    label = labels.label
     colors = labelled_colors(voxels.colours, label, object_map.classes)
     ids = [thing.id for thing in object_map.things]
     number = None if instances is None else instances.number
-    folder.write_labels(voxels.points, colors, label, object_map.classes, number, ids)
+    written = PointLabels(label, labels.second, labels.margin)
+    folder.write_labels(voxels.points, colors, written, object_map.classes, number, ids)
     points = {name: int(np.sum(label == k)) for k, name in enumerate(object_map.classes)}
     points = {name: count for name, count in points.items() if count} | {BACKGROUND: int(np.sum(label == NO_OBJECT))}
     _add_counts(folder, object_map, points, instances)

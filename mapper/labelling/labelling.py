@@ -22,6 +22,9 @@ class Labels:
 
     Attributes:
         label: (N,) int64 index into the classes, `NO_OBJECT` for background.
+        second: (N,) the same: what the voxel's own evidence says next to its label, or rather than that.
+        margin: (N,) float32 nats of one look, by which the voxel's own evidence is for `label` and not for `second`;
+            below 0 where the neighbours have decided.
         pairs: of voxels that touch and are asked to agree.
         energy: of the labels, nats (eq. 1).
         gap: by which share of its lower bound the energy may be too high at most; None where no bound was asked for.
@@ -29,6 +32,8 @@ class Labels:
     """
 
     label: np.ndarray
+    second: np.ndarray
+    margin: np.ndarray
     pairs: int
     energy: float
     gap: float | None
@@ -55,10 +60,22 @@ def label_voxels(voxels: Voxels, config: MrfConfig, more: np.ndarray | None = No
     weights = pair_weights(edges, voxels.cells, normals, voxels.colours, config)
     found = minimise(PottsEnergy(-log_p.astype(np.float32), edges, weights), config)
     label = found.labelling.labels.astype(np.int64)
+    second, margin = _runners_up(log_p, label)
     return Labels(
         label=np.where(label == background, NO_OBJECT, label),
+        second=np.where(second == background, NO_OBJECT, second),
+        margin=margin,
         pairs=len(edges),
         energy=found.labelling.energy,
         gap=found.gap,
         settled=found.labelling.settled,
     )
+
+
+def _runners_up(log_p: np.ndarray, label: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(N,) the likeliest columns of (N, L) other than (N,) labels, and (N,) by how much less likely they are."""
+    rows = np.arange(len(log_p))
+    others = log_p.copy()
+    others[rows, label] = -np.inf
+    second = others.argmax(axis=1)
+    return second, (log_p[rows, label] - others[rows, second]).astype(np.float32)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...datasets.errors import InputError, UserError
-from .cloud_file import read_instances
+from .labels_file import read_instances
 from .thing import Thing
 
 LABEL = "label the run again with `thingmap label`, then load its map again"

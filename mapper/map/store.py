@@ -14,7 +14,8 @@ from ...datasets.errors import InputError, UserError
 from ..edits.journal import journal_path
 from .appearance import embeddings_path
 from .atomic import make_folder, replacing, write_atomic
-from .cloud_file import AGAIN, read_cloud, write_cloud, write_labels
+from .cloud_file import AGAIN, read_cloud, write_cloud
+from .labels_file import PointLabels, write_labels
 from .map_file import CLOUD_NAME
 from .map_file import FILE_NAME as MAP_FILE
 from .object_map import ObjectMap
@@ -149,12 +150,12 @@ class OutputFolder:
         self,
         points: np.ndarray,
         colors: np.ndarray,
-        labels: np.ndarray,
+        labels: PointLabels,
         classes: Sequence[str],
         instance: np.ndarray | None = None,
         things: Sequence[str] = (),
     ) -> None:
-        """The cloud with its labels; see `cloud_file.write_labels`. The evaluator reads it in place of the cloud."""
+        """The cloud with its labels; see `labels_file.write_labels`. The evaluator reads it in place of the cloud."""
         write_labels(self.labels_file, points, colors, labels, classes, instance, things)
 
     def set_labels_aside(self) -> None:

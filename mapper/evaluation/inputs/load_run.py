@@ -2,11 +2,7 @@
 
 map.json  trajectory.txt  report.json    as `thingmap run` writes them
 cloud.ply                                the cloud, read when it is asked for
-labels.ply                               optional, takes the place of cloud.ply: a cloud whose vertices have an
-                                         integer `label` (or `class`). Comment lines `label 3 "cup"` say what a
-                                         number means, as in exported PLYs; what they do not name is nothing.
-                                         Without them it is an index into the classes of map.json, negative for
-                                         nothing.
+labels.ply                               optional, takes the place of cloud.ply: a cloud with labels (see `read_labels`)
 snapshots/index.json  snapshots/*.json   optional, maps on the way (`thingmap run --snapshots`)
 keyframes.npz                            optional, stamps (M,), T_world_camera (M, 4, 4) and covariance (M, 6, 6)
 """
@@ -17,7 +13,6 @@ import json
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
@@ -25,7 +20,7 @@ import numpy as np
 from ....datasets.errors import InputError
 from ....datasets.json_record import JsonRecord
 from ....datasets.poses import nearest_rotations, read_tum_poses
-from ....datasets.truth import NO_OBJECT
+from ...map.labels_file import read_labels
 from ...map.object_map import ObjectMap
 from ...map.store import AGAIN, OutputFolder
 from ..result import NotEvaluated
@@ -134,64 +129,8 @@ def _is_covariance(matrix: np.ndarray) -> bool:
 def _read_cloud(folder: OutputFolder, object_map: ObjectMap) -> tuple[np.ndarray, np.ndarray | None]:
     labelled = folder.path / LABELS_FILE
     if labelled.is_file():
-        return _read_labels(labelled, object_map)
+        points, labels = read_labels(labelled, object_map.classes)
+        return points, labels.label
     if not folder.cloud_file.is_file():
         raise NotEvaluated(f"the run has no cloud: there is neither {folder.cloud_file.name} nor {LABELS_FILE}")
     return folder.read_cloud()[0], None
-
-
-def _read_labels(file: Path, object_map: ObjectMap) -> tuple[np.ndarray, np.ndarray]:
-    """(M, 3) metres and (M,) int64 indices into the map's classes, `NO_OBJECT` for none."""
-    from plyfile import PlyData, PlyParseError
-
-    try:
-        content = PlyData.read(str(file))
-        vertices = content["vertex"].data
-        points = np.stack([vertices[axis] for axis in "xyz"], axis=1).astype(np.float64)
-        field = next(name for name in ("label", "class") if name in (vertices.dtype.names or ()))
-        numbers = vertices[field]
-    except StopIteration:
-        found = "no such property"
-        raise InputError(file, "an integer `label` for every vertex", found, "add it, or remove the file") from None
-    except (OSError, KeyError, ValueError, PlyParseError) as error:
-        raise InputError(file, "a labelled cloud in PLY", str(error), "write it again, or remove it") from None
-    if numbers.dtype.kind not in "iu":
-        raise InputError(file, f"an integer `{field}`", f"type {numbers.dtype}", "write it as int, or remove the file")
-    named = _named_labels(file, [*content.comments, *content["vertex"].comments], object_map)
-    numbers = numbers.astype(np.int64)
-    if named:
-        codes, inverse = np.unique(numbers, return_inverse=True)
-        return points, np.array([named.get(int(code), NO_OBJECT) for code in codes], dtype=np.int64)[inverse]
-    if len(numbers) and numbers.max() >= len(object_map.classes):
-        expected = f"`{field}` below {len(object_map.classes)}, the number of the map's classes"
-        remedy = 'say what the labels mean in comment lines such as `label 3 "cup"`'
-        raise InputError(file, expected, str(numbers.max()), remedy)
-    return points, np.where(numbers < 0, NO_OBJECT, numbers)
-
-
-def _named_labels(file: Path, comments: list[str], object_map: ObjectMap) -> dict[int, int]:
-    """Number in the file -> index into the map's classes, from comment lines `label 3 "cup"`."""
-    index = {name.casefold(): k for k, name in enumerate(object_map.classes)}
-    named: dict[int, int] = {}
-    for line in comments:
-        words = line.split(maxsplit=2)
-        if len(words) != 3 or words[0] != "label":
-            continue
-        try:
-            number, name = int(words[1]), _text(json.loads(words[2]))
-        except ValueError:
-            remedy = 'write lines such as `comment label 3 "cup"`'
-            raise InputError(file, "a number and a name in quotes", repr(line), remedy) from None
-        if name.casefold() not in index:
-            known = ", ".join(object_map.classes)
-            raise InputError(
-                file, f"classes of the map ({known})", repr(name), "label the cloud with the map's classes"
-            )
-        named[number] = index[name.casefold()]
-    return named
-
-
-def _text(value: Any) -> str:
-    if not isinstance(value, str):
-        raise ValueError(f"{value!r} is no text")
-    return value

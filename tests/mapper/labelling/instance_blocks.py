@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from thingmap.datasets.truth import NO_OBJECT
 from thingmap.mapper.labelling.box_config import BoxConfig
 from thingmap.mapper.labelling.labelling import Labels
 from thingmap.mapper.labelling.labelling_config import LabellingConfig
@@ -39,7 +40,9 @@ def make_voxels(parts) -> tuple[Voxels, Labels, list[np.ndarray]]:
         count=np.ones(n, np.int32),
         views=np.ones(n, np.int32),
     )
-    labels = Labels(label=label[order].astype(np.int64), pairs=0, energy=0.0, gap=None, settled=True)
+    label = label[order].astype(np.int64)
+    second, margin = np.full(n, NO_OBJECT), np.ones(n, np.float32)
+    labels = Labels(label=label, second=second, margin=margin, pairs=0, energy=0.0, gap=None, settled=True)
     return voxels, labels, [row[part == p] for p in range(len(parts))]
 
 

@@ -32,7 +32,7 @@ def label(folder: OutputFolder, cup_cells=(13, 8, 8), config=NO_BOXES) -> Object
     object_map = read_volumes(folder)
     voxels, labels, _ = make_voxels([(block((0, 0, 0), cup_cells), 0), (block((50, 0, 0), (8, 8, 8)), 1)])
     instances = find_instances(voxels, labels, object_map, config)
-    write_labelling(folder, object_map, voxels, labels.label, instances)
+    write_labelling(folder, object_map, voxels, labels, instances)
     return ObjectMap.load(folder.path)
 
 

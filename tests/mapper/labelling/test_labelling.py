@@ -90,6 +90,17 @@ def test_a_bound_is_told_when_asked_for():
     assert gap is not None and 0.0 <= gap < 1e-3  # a chain: the bound is the least energy itself
 
 
+def test_what_a_voxel_says_itself_stands_beside_its_label():
+    p = [[0.7, 0.1, 0.1, 0.2], [0.2, 0.1, 0.1, 0.3], [0.7, 0.1, 0.1, 0.2]]
+    voxels = make_voxels(row_of(3), p)
+    alone = label_voxels(voxels, MrfConfig(smoothness=Smoothness.NONE))
+    assert alone.label.tolist() == [0, NO_OBJECT, 0] and alone.second.tolist() == [NO_OBJECT, 0, NO_OBJECT]
+    np.testing.assert_allclose(alone.margin, np.log([3.5, 1.5, 3.5]), rtol=1e-5)
+    together = label_voxels(voxels, MrfConfig(smoothness=Smoothness.POTTS, potts_strength=50.0))
+    assert together.label.tolist() == [0, 0, 0] and together.second.tolist() == [NO_OBJECT] * 3
+    np.testing.assert_allclose(together.margin, np.log([3.5, 1 / 1.5, 3.5]), rtol=1e-5)  # overruled
+
+
 def test_points_in_a_box_are_of_its_thing_as_far_as_it_is_known(make_thing, make_map):
     sure = {"position_covariance": np.zeros((3, 3)), "size_std": [0.0, 0.0, 0.0], "yaw": 0.0}
     cup = make_thing(1, "cup", 0.9, existence=0.8, position=[0, 0, 1], size=[0.1, 0.1, 0.2], **sure)
