@@ -23,12 +23,13 @@ from thingmap.mapper.evaluation.inputs.build_case import build_case
 from thingmap.mapper.evaluation.inputs.case import Case, MappedRun
 from thingmap.mapper.evaluation.inputs.load_run import load_run
 from thingmap.mapper.evaluation.points.labelled_points import label_points
-from thingmap.mapper.labelling.labelling import label_voxels
+from thingmap.mapper.labelling.labelling import Labels, label_voxels
 from thingmap.mapper.labelling.labelling_config import LabellingConfig
 from thingmap.mapper.labelling.mrf_config import Smoothness
 from thingmap.mapper.labelling.validation import ValidationConfig, Validator
 from thingmap.mapper.labelling.volumes_evidence import weighted_volumes
 from thingmap.mapper.labelling.voxels import Voxels
+from thingmap.mapper.map.labels_file import PointLabels
 
 MANY, FEW = 10, 80  # frames from one that is looked at to the next (Lai et al., IV-B)
 BETWEEN = MANY // 2  # boxes are checked in the frames in the middle between those that labels come from
@@ -86,27 +87,27 @@ def judge_scene(job: Job) -> JudgedScene:
     numba.set_num_threads(1)
     out = mapped(job)
     run, sequence, truth = load_run(out.path), open_sequence(job.place), open_truth(job.place)
-    config, points, labels = LabellingConfig(), {}, None
+    config, points, checked = LabellingConfig(), {}, None
     for stride in (MANY, FEW):
         voxels = gather(job, run, sequence, replace(config, stride=stride))
         for variant in VARIANTS:
             if variant.stride == stride:
-                label = label_by(variant, voxels, run, config)
-                points[variant] = judge_points(voxels, label, run, job)
+                labels = label_by(variant, voxels, run, config)
+                points[variant] = judge_points(voxels, labels.label, run, job)
                 if variant == CHECKED:
-                    labels = voxels.points, label
-    assert labels is not None
+                    checked = voxels.points, PointLabels(labels.label, labels.second, labels.margin)
+    assert checked is not None
     order = np.argsort(run.stamps, kind="stable")
     poses = run.stamps[order], run.poses[order]
-    validator = Validator(*labels, run.object_map.classes, *poses, ValidationConfig())
+    validator = Validator(*checked, run.object_map.classes, *poses, ValidationConfig())
     before, after = check_detections(job, build_case(run, truth), sequence, validator)
     return JudgedScene(job, truth.classes, points, before, after)
 
 
-def label_by(variant: Variant, voxels: Voxels, run: MappedRun, config: LabellingConfig) -> np.ndarray:
-    """(N,) labels of the voxels, indices into the map's classes."""
+def label_by(variant: Variant, voxels: Voxels, run: MappedRun, config: LabellingConfig) -> Labels:
+    """Labels of the voxels, indices into the map's classes."""
     more = weighted_volumes(voxels.points, run.object_map, config) if variant.volumes else None
-    return label_voxels(voxels, replace(config.mrf, smoothness=variant.term), more).label
+    return label_voxels(voxels, replace(config.mrf, smoothness=variant.term), more)
 
 
 def judge_points(voxels: Voxels, label: np.ndarray, run: MappedRun, job: Job) -> Points:

@@ -12,6 +12,7 @@ from thingmap.datasets.frame import Frame, Intrinsics
 from thingmap.datasets.truth import NO_OBJECT
 from thingmap.detectors.detections import Detections
 from thingmap.mapper.labelling.validation import ValidationConfig, Validator, central_votes, visible_points
+from thingmap.mapper.map.labels_file import PointLabels
 
 CUP, BOWL = 0, 1
 CLASSES = ("Cup", "bowl")
@@ -38,8 +39,9 @@ def make_points() -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([seen, hidden]), np.append(label, np.full(len(hidden), BOWL))
 
 
-def make_validator(points, labels, **config) -> Validator:
-    return Validator(points, labels, CLASSES, np.array([0.5]), np.eye(4)[None], ValidationConfig(**config))
+def make_validator(points, labels, second=None, margin=None, **config) -> Validator:
+    known = PointLabels(labels, second, margin)
+    return Validator(points, known, CLASSES, np.array([0.5]), np.eye(4)[None], ValidationConfig(**config))
 
 
 def boxes(*claims, classes=("cup", "bowl")) -> Detections:
@@ -60,6 +62,22 @@ def test_classes_are_told_by_name_and_not_by_number():
     assert make_validator(*make_points()).validate(found, make_frame(), np.eye(4)).tolist() == [True, False]
     with pytest.raises(UserError, match="sofa"):
         make_validator(*make_points()).validate(boxes((ON_CUP, 0), classes=("sofa",)), make_frame(), np.eye(4))
+
+
+def test_a_box_stays_that_unsure_points_may_be_of():
+    """The cup is labelled background, but half of its points are that by a little, and next a cup."""
+    points, labels = make_points()
+    on_cup, background = labels == CUP, np.full(len(labels), NO_OBJECT)
+    frame, found = make_frame(), boxes((ON_CUP, CUP), (ON_CUP, BOWL), (ON_WALL, CUP))
+    top = INTRINSICS.project(points)[:, 1] < 24.0
+    second = np.where(on_cup, CUP, BOWL)
+    for near, stays in ((0.5, [True, False, False]), (0.7, [False, False, False])):
+        margin = np.where(on_cup & top, near, 1.2).astype(np.float32)
+        validator = make_validator(points, background, second, margin, doubt=0.6, central=1.0)
+        assert validator.validate(found, frame, np.eye(4)).tolist() == stays
+    by_labels_alone = make_validator(points, background, second, margin - 1.0, doubt=0.0, central=1.0)
+    assert not make_validator(points, background).validate(found, frame, np.eye(4)).any()
+    assert by_labels_alone.validate(found, frame, np.eye(4)).tolist() == [True, False, False]  # the evidence is a cup's
 
 
 def test_only_the_middle_counts():
