@@ -1,7 +1,7 @@
 """Everything that is learned of a detector: what its scores, its misses and its false detections say.
 
-`thingmap learn` writes it from sequences with truth. One learned on the synthetic world is shipped; without any,
-`generic_evidence_model` has sensible numbers for detectors with sigmoid scores.
+`thingmap learn` writes it from sequences with truth. Two learned on the synthetic world are shipped, of the simulated
+detector and of HOG; without any, `generic_evidence_model` has sensible numbers for detectors with sigmoid scores.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from .score_model import BIN_CENTRES, BINS, TRUNCATION, ScoreModel
 from .size_table import plain_name
 
 SHIPPED = Path(__file__).with_name("evidence_model.json")
+SHIPPED_HOG = Path(__file__).with_name("evidence_hog.json")  # of the HOG detector that comes with thingmap
 KNOWN_SHARE = 0.5  # of a detector's classes, from which the shipped model is taken to speak of it
 MEAN_VISIBLE = 0.52  # score of an object in full view: indoor classes score about 0.5
 MEAN_OCCLUDED = 0.28  # at an occlusion of 0.7: about half; between, a line

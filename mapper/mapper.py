@@ -16,8 +16,6 @@ from ..detectors.detector import Detector
 from ..factors.evidence_model import (
     EvidenceModel,
     default_evidence_model,
-    generic_evidence_model,
-    load_evidence_model,
 )
 from ..factors.score_model import ScoreEvidence
 from ..factors.size_prior import ClassSizePriors, load_size_priors
@@ -32,6 +30,7 @@ from .estimation.lifting import LiftedDetection, lift
 from .estimation.outcomes import Outcome
 from .estimation.scene import Scene
 from .estimation.view import View
+from .evidence_choice import evidence_model, with_evidence_of
 from .glimpse import Glimpse
 from .map.compose import compose_things
 from .map.object_map import ObjectMap
@@ -40,8 +39,6 @@ from .stages import StageClock
 from .trajectory.camera import CameraGraph
 from .trajectory.cloud import KeyframeCloud
 from .trajectory.constellation.recognition import same_places
-
-GENERIC = "generic"  # name of the evidence model that was learned from nothing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,8 +66,9 @@ class SemanticMapper:
         config: every number of the mapper.
         source: name of what is mapped, kept in the map.
         gravity: (3,) unit vector pointing down in the dataset's world, where known; used with the dataset's poses.
-        model: what is known of the detector; by default the one that the configuration names, else the shipped one
-            for a detector of its classes and the generic one for others (`default_evidence_model`).
+        model: what is known of the detector; by default the one that the configuration names, else the detector
+            (`evidence_model`), else the shipped one for a detector of its classes and the generic one for others
+            (`default_evidence_model`).
     """
 
     def __init__(
@@ -82,7 +80,7 @@ class SemanticMapper:
         gravity: np.ndarray | None = None,
         model: EvidenceModel | None = None,
     ) -> None:
-        self.config = config or MapperConfig()
+        self.config = with_evidence_of(detector, config or MapperConfig())
         self._detector, self._source = detector, source
         self._learned = model or evidence_model(self.config.evidence.model)  # None: by the classes
         self._camera = CameraGraph(self.config, gravity)
@@ -321,10 +319,3 @@ class SemanticMapper:
 
     def _count_things(self) -> int:
         return sum(landmark.belief.existence >= PROBABLE for landmark in self._scene.landmarks.values())
-
-
-def evidence_model(name: str) -> EvidenceModel | None:
-    """The evidence model that a configuration names: a file, or "generic" for none; None where it names nothing."""
-    if name == GENERIC:
-        return generic_evidence_model()
-    return load_evidence_model(Path(name)) if name else None

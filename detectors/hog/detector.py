@@ -21,6 +21,8 @@ from .score_vectors import score_vectors
 from .scoring import Scorer
 from .suppression import suppress
 
+SHIPPED = "hog"  # name of what is known of the shipped model
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HogDetector:
@@ -43,6 +45,8 @@ class HogDetector:
         merge: one box at a place, with the scores of all classes there. Without, the boxes of every class as if it had
             a detector to itself, with its own score only (NaN for the others): for precision and recall by class.
         maps: how `detect_dense` makes its maps.
+        evidence_model: what the mapper shall know of it: "hog" of the shipped model; of another's file FILE.npz the
+            FILE.evidence.json beside it, if `thingmap learn` has written one there; else nothing, "".
 
     Raises:
         InputError: for a file that is not a model.
@@ -56,18 +60,26 @@ class HogDetector:
     parts: bool = True
     merge: bool = True
     maps: MapConfig = field(default_factory=MapConfig)
+    evidence_model: str = field(init=False)
     _templates: tuple[HogTemplate, ...] = field(init=False, repr=False)
     _scorer: Scorer | None = field(init=False, repr=False)
     _corners: np.ndarray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         check_selection(self.confidence, self.max_detections, self.nms_iou)
-        model = self.model
+        model, known = self.model, ""
         if not isinstance(model, HogModel):
+            known = SHIPPED if model is None else _evidence_beside(Path(model))
             model = load_model(shipped_model() if model is None else model)
         templates = tuple(t for t in model.templates if self.parts or t.part == Part.WHOLE)
         scorer = Scorer(templates) if templates else None
-        made = {"model": model, "_templates": templates, "_scorer": scorer, "_corners": corner_boxes(templates)}
+        made = {
+            "model": model,
+            "evidence_model": known,
+            "_templates": templates,
+            "_scorer": scorer,
+            "_corners": corner_boxes(templates),
+        }
         for name, value in made.items():
             object.__setattr__(self, name, value)
 
@@ -136,6 +148,11 @@ class HogDetector:
             scores[np.arange(len(found)), found.class_id] = found.probability
         order = np.argsort(-np.nanmax(scores, axis=1, initial=0.0), kind="stable")
         return Detections(self.classes, _clipped(found.xyxy, frame)[order], scores[order], found.part[order])
+
+
+def _evidence_beside(model: Path) -> str:
+    file = model.with_suffix(".evidence.json")
+    return str(file) if file.is_file() else ""
 
 
 def _clipped(xyxy: np.ndarray, frame: Frame) -> np.ndarray:

@@ -95,6 +95,7 @@ def run(
     from ...datasets.open import open_sequence
     from ...detectors.spec import make_detector
     from ..config_file import dump_config
+    from ..evidence_choice import with_evidence_of
     from ..lidar_config import default_config
     from ..map.store import OutputFolder
     from ..snapshots import parse_snapshot_frames
@@ -116,6 +117,7 @@ def run(
     _check_odometry(settings.odometry, frames, sequence)
     spec = choose_detector(detector, sequence, frames)
     detect = make_detector(spec, frames)
+    settings = with_evidence_of(detect, settings)
     mapper = _make_mapper(frames, detect, settings, inference, views, judge)
     MappingJob(
         sequence=frames,

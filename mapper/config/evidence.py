@@ -43,7 +43,7 @@ class EvidenceConfig:
     misses: bool = True  # off: what should have been seen and was not says nothing
     depth: bool = True  # off: depth at an object's place says nothing for or against it
     parts: bool = True  # off: detections of object parts are not used
-    model: str = ""  # path of an evidence model that `thingmap learn` wrote; "generic" for none; empty: the shipped one
-    # for a detector of its classes, the generic one for others
+    model: str = ""  # path of an evidence model that `thingmap learn` wrote; "hog": of the shipped HOG detector;
+    # "generic" for none; empty: what the detector says, else the shipped one for its classes, else the generic one
     free_space: FreeSpace = field(default_factory=FreeSpace)
     presence: PresenceConfig = field(default_factory=PresenceConfig)

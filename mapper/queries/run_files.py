@@ -11,6 +11,7 @@ import numpy as np
 from ...factors.evidence_model import EvidenceModel, default_evidence_model
 from ..config import BeliefConfig, MapperConfig
 from ..config_file import load_config
+from ..evidence_choice import evidence_model
 from ..map.store import OutputFolder
 from ..map.views_file import StoredViews
 from .map_content import MapContent
@@ -48,8 +49,6 @@ class RunFiles:
         Raises:
             InputError: the model that the run's configuration names is missing or damaged.
         """
-        from ..mapper import evidence_model  # imports the whole mapper: only for those who ask
-
         name = self._config.evidence.model
         chosen = (evidence_model(name) if name else None) or default_evidence_model(self._content.classes)
         return chosen.bind(self._content.classes)
