@@ -1,6 +1,8 @@
 """The loop, the back end, the map and what people do with it."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from ..datasets.on_demand import on_demand
 
 if TYPE_CHECKING:
     from .config import MapperConfig as MapperConfig
@@ -19,10 +21,4 @@ _PLACES = {
 __all__ = ["MapUpdate", "MapperConfig", "ObjectMap", "SemanticMapper", "Thing"]
 
 
-def __getattr__(name: str) -> Any:
-    # looked up when asked for: importing the solver takes a second, and a map can be read without it
-    if name not in _PLACES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module
-
-    return getattr(import_module(f".{_PLACES[name]}", __name__), name)
+__getattr__ = on_demand(__name__, _PLACES)  # the solver takes a second, and a map can be read without it
