@@ -64,7 +64,9 @@ def test_verdicts_tell_the_order_and_the_aim(rises):
     assert ("does NOT reach 0.90" in lines[2]) is not rises
     assert "NOT the paper's order" in lines[0]  # all the same
     assert "improves precision on 1 of the 1 scenes" in lines[-1]
-    assert "improves precision on 0 of the 1 scenes" in verdicts([made_up({}, AFTER, BEFORE)])
+    assert "on 0 of the 1 scenes" in verdicts([made_up({}, AFTER, BEFORE)])
+    assert "on 1 of the 2 scenes" in (said := verdicts([made_up({}, BEFORE, AFTER), made_up({}, AFTER, AFTER)]))
+    assert "on 1 it was 1 before" in said and "on 0 it was 1 before" in lines[-1]
 
 
 def test_tables_say_what_was_labelled_right():
