@@ -12,20 +12,17 @@ simulated one's boxes. Boxes are checked in frames that no label comes from.
 from __future__ import annotations
 
 import argparse
-import multiprocessing
 import sys
 import tempfile
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
-import numba
+from judging import judge_all
 from labelling_folder import Job
 from labelling_job import MANY, JudgedScene, judge_scene
 from labelling_report import box_table, category_table, clutter_table, f_table, verdicts
 from results import show_section
 from suite import FIRST_SEED, Scene
-from suite_job import is_rendered, render
 
 from thingmap.datasets.errors import UserError
 from thingmap.datasets.synthetic.config import ClutterLevel, Preset
@@ -43,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             scenes = scenes_of(options.first_seed, options.seeds, options.quick)
             jobs = [Job(s, folder, DETECTORS[name], options.reuse) for name in options.detectors for s in scenes]
-            judged = judge_all(jobs, options.jobs)
+            judged = judge_all(judge_scene, jobs, options.jobs, lambda job: f"{job.scene.name}, {job.detector}")
         except UserError as error:
             print(f"error: {error}", file=sys.stderr)
             return 2
@@ -63,21 +60,6 @@ def scenes_of(first_seed: int, seeds: int, quick: bool) -> list[Scene]:
     """What is judged: so many of each level of clutter."""
     count, frames = (1, QUICK_FRAMES) if quick else (seeds, FRAMES)
     return [Scene(Preset.TABLETOP, level, first_seed + k, frames) for level in ClutterLevel for k in range(count)]
-
-
-def judge_all(jobs: Sequence[Job], processes: int) -> list[JudgedScene]:
-    """One after the other, or several at a time; scenes are rendered if absent."""
-    for job in jobs:
-        if not is_rendered(job.scene, job.folder):
-            render(job.scene, job.folder)
-    judged, start = [], time.perf_counter()
-    with multiprocessing.get_context("spawn").Pool(processes, numba.set_num_threads, (1,)) as pool:
-        for one in pool.imap(judge_scene, jobs):
-            judged.append(one)
-            minutes = (time.perf_counter() - start) / 60.0
-            line = f"judged {one.job.scene.name}, {one.job.detector} after {minutes:.1f} min"
-            print(line, file=sys.stderr, flush=True)
-    return judged
 
 
 def describe(name: str, judged: Sequence[JudgedScene]) -> str:

@@ -14,15 +14,13 @@ than single views by a margin), and what the graph and the judge know of the det
 from __future__ import annotations
 
 import argparse
-import multiprocessing
 import sys
 import tempfile
-import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-import numba
 import numpy as np
+from judging import judge_all
 from results import show_section
 from shape_context_evidence import evidence_file, learn_evidence
 from shape_context_job import GRAPHS, JUDGES, TRACKS, Job, JudgedScene, Mode, judge_scene
@@ -41,7 +39,6 @@ from shape_context_report import (
     verdicts,
 )
 from suite import FIRST_SEED, Scene
-from suite_job import is_rendered, render
 
 from thingmap.datasets.errors import UserError
 from thingmap.datasets.synthetic.config import ClutterLevel, Preset
@@ -63,12 +60,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             evidence = evidence_file(folder, model)
             if not (options.reuse and evidence.is_file()):
                 learn_evidence(model, folder, options.quick)
-            judge = judge_file(folder, model)
-            if not (options.reuse and judge.is_file()):
+            of_tracks = judge_file(folder, model)
+            if not (options.reuse and of_tracks.is_file()):
                 learn_judge(model, folder, options.quick)
-            known = folder, model, evidence, judge
-            limits = thresholds(judge_all([Job(s, *known) for s in threshold_scenes(options.quick)], options.jobs))
-            judged = judge_all([Job(s, *known, limits) for s in held_out_scenes(options.quick)], options.jobs)
+            known = folder, model, evidence, of_tracks
+            limits = thresholds(judge([Job(s, *known) for s in threshold_scenes(options.quick)], options.jobs))
+            judged = judge([Job(s, *known, limits) for s in held_out_scenes(options.quick)], options.jobs)
         except UserError as error:
             print(f"error: {error}", file=sys.stderr)
             return 2
@@ -96,18 +93,9 @@ def threshold_scenes(quick: bool = False) -> list[Scene]:
     return [Scene(Preset.TABLETOP, level, seed, frames) for level in ClutterLevel for seed in seeds]
 
 
-def judge_all(jobs: Sequence[Job], processes: int) -> list[JudgedScene]:
-    """One after the other, or several at a time; scenes are rendered if absent."""
-    for job in jobs:
-        if not is_rendered(job.scene, job.folder):
-            render(job.scene, job.folder)
-    judged, start = [], time.perf_counter()
-    with multiprocessing.get_context("spawn").Pool(processes, numba.set_num_threads, (1,)) as pool:
-        for one in pool.imap(judge_scene, jobs):
-            judged.append(one)
-            minutes = (time.perf_counter() - start) / 60.0
-            print(f"judged {one.job.scene.name} after {minutes:.1f} min", file=sys.stderr, flush=True)
-    return judged
+def judge(jobs: Sequence[Job], processes: int) -> list[JudgedScene]:
+    """So many at a time; scenes are rendered if absent."""
+    return judge_all(judge_scene, jobs, processes, lambda job: job.scene.name)
 
 
 def describe(judged: Sequence[JudgedScene], limits: Thresholds) -> str:
