@@ -91,9 +91,9 @@ def describe(tried: Sequence[Tried], options: argparse.Namespace) -> str:
     texts = [
         f"{options.scenes} `survey` scenes a clutter level, {seeds}, detections of `{DETECTOR.format(seed='SEED')}`. "
         f"A map of the first {START} views is asked `where_to_look` about the things (is it there, and what is it) and "
-        f"the label of which it is least sure; every {EVERY}. other frame is then added, each by itself, to a map of "
-        "its own. Bits: entropy of the answer. Brier: squared error of all its probabilities, against the truth; a "
-        "label's are sums over the map's things. The last view of the first map is what is near or far. Differences "
+        f"the label of which it is least sure; of the other frames one in {EVERY} is then added, each by itself, to a "
+        "map of its own. Bits: entropy of the answer. Brier: squared error of all probabilities, against the truth; "
+        "a label's are sums over the map's things. The last view of the first map is what is near or far. Differences "
         f"are to a view chosen at random, with the {CONFIDENCE:.0%} interval of {DRAWS} draws of scenes."
     ]
     for title, about_thing in (("A thing", True), ("A label", False)):
