@@ -29,7 +29,6 @@ from thingmap.mapper.labelling.mrf_config import Smoothness
 from thingmap.mapper.labelling.validation import ValidationConfig, Validator
 from thingmap.mapper.labelling.volumes_evidence import weighted_volumes
 from thingmap.mapper.labelling.voxels import Voxels
-from thingmap.mapper.map.labels_file import PointLabels
 
 MANY, FEW = 10, 80  # frames from one that is looked at to the next (Lai et al., IV-B)
 BETWEEN = MANY // 2  # boxes are checked in the frames in the middle between those that labels come from
@@ -95,7 +94,7 @@ def judge_scene(job: Job) -> JudgedScene:
                 labels = label_by(variant, voxels, run, config)
                 points[variant] = judge_points(voxels, labels.label, run, job)
                 if variant == CHECKED:
-                    checked = voxels.points, PointLabels(labels.label, labels.second, labels.margin)
+                    checked = voxels.points, labels.of_points()
     assert checked is not None
     order = np.argsort(run.stamps, kind="stable")
     poses = run.stamps[order], run.poses[order]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...datasets.truth import NO_OBJECT
+from ..map.labels_file import PointLabels
 from .energy import PottsEnergy
 from .minimise import minimise
 from .mrf_config import MrfConfig, Smoothness
@@ -38,6 +39,10 @@ class Labels:
     energy: float
     gap: float | None
     settled: bool
+
+    def of_points(self) -> PointLabels:
+        """What labels.ply says of the voxels, a point each."""
+        return PointLabels(self.label, self.second, self.margin)
 
 
 def label_voxels(voxels: Voxels, config: MrfConfig, more: np.ndarray | None = None) -> Labels:
