@@ -8,7 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from .map.atomic import replacing
-from .map.labels_file import PointLabels
+from .map.labels_file import PointLabels, write_labels
 from .map.object_map import ObjectMap
 from .map.store import OutputFolder
 from .queries.answer import PROBABLE
@@ -70,4 +70,4 @@ def _save_labels(folder: OutputFolder, mapper: Mapper, object_map: ObjectMap) ->
     if labels is None:
         folder.set_labels_aside()
     else:
-        folder.write_labels(*mapper.cloud(), PointLabels(labels), object_map.classes)
+        write_labels(folder.labels_file, *mapper.cloud(), PointLabels(labels), object_map.classes)

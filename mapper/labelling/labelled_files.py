@@ -12,6 +12,7 @@ from ...datasets.errors import InputError
 from ...datasets.truth import NO_OBJECT
 from ..export.colors import class_color
 from ..map.atomic import write_atomic
+from ..map.labels_file import write_labels
 from ..map.map_to_document import format_document
 from ..map.object_map import ObjectMap
 from ..map.store import AGAIN, OutputFolder
@@ -53,7 +54,7 @@ def write_labelling(
     colors = labelled_colors(voxels.colours, label, object_map.classes)
     ids = [thing.id for thing in object_map.things]
     number = None if instances is None else instances.number
-    folder.write_labels(voxels.points, colors, labels.of_points(), object_map.classes, number, ids)
+    write_labels(folder.labels_file, voxels.points, colors, labels.of_points(), object_map.classes, number, ids)
     points = {name: int(np.sum(label == k)) for k, name in enumerate(object_map.classes)}
     points = {name: count for name, count in points.items() if count} | {BACKGROUND: int(np.sum(label == NO_OBJECT))}
     _add_counts(folder, object_map, points, instances)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,6 @@ from ..edits.journal import journal_path
 from .appearance import embeddings_path
 from .atomic import make_folder, replacing, write_atomic
 from .cloud_file import AGAIN, read_cloud, write_cloud
-from .labels_file import PointLabels, write_labels
 from .map_file import CLOUD_NAME
 from .map_file import FILE_NAME as MAP_FILE
 from .object_map import ObjectMap
@@ -145,18 +143,6 @@ class OutputFolder:
     def write_cloud(self, points: np.ndarray, colors: np.ndarray) -> None:
         """(M, 3) metres and (M, 3) uint8 RGB as binary PLY."""
         write_cloud(self.cloud_file, points, colors)
-
-    def write_labels(
-        self,
-        points: np.ndarray,
-        colors: np.ndarray,
-        labels: PointLabels,
-        classes: Sequence[str],
-        instance: np.ndarray | None = None,
-        things: Sequence[str] = (),
-    ) -> None:
-        """The cloud with its labels; see `labels_file.write_labels`. The evaluator reads it in place of the cloud."""
-        write_labels(self.labels_file, points, colors, labels, classes, instance, things)
 
     def set_labels_aside(self) -> None:
         """Labels of an earlier run, which are not this map's, get another name."""

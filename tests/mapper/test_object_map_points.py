@@ -10,7 +10,7 @@ import pytest
 
 from thingmap.datasets.errors import InputError, UserError
 from thingmap.datasets.truth import NO_OBJECT
-from thingmap.mapper.map.labels_file import PointLabels
+from thingmap.mapper.map.labels_file import PointLabels, write_labels
 from thingmap.mapper.map.object_map import MapFrame, ObjectMap
 from thingmap.mapper.map.store import OutputFolder
 from thingmap.mapper.map.thing import Evidence, Thing
@@ -59,7 +59,7 @@ def out(bare) -> Path:
     """The same, labelled: the second thing has two points, the first one, the third none."""
     ids = [thing.id for thing in ObjectMap.load(bare).things]
     colors = np.zeros((5, 3), np.uint8)
-    OutputFolder(bare).write_labels(POINTS, colors, PointLabels(LABELS), ("cup", "bowl"), NUMBERS, ids)
+    write_labels(OutputFolder(bare).labels_file, POINTS, colors, PointLabels(LABELS), ("cup", "bowl"), NUMBERS, ids)
     change(bare, labels={"file": "labels.ply", "points": COUNTS})
     change_things(bare, lambda n, thing: thing | {"points": [1, 2, 0][n]})
     return bare
@@ -128,8 +128,14 @@ def test_labels_without_things_say_so(out):
 
 
 def test_the_cloud_of_another_map_is_refused(out):
-    OutputFolder(out).write_labels(
-        POINTS, np.zeros((5, 3), np.uint8), PointLabels(LABELS), ("cup",), NUMBERS, ["thing-0007", "x"]
+    write_labels(
+        OutputFolder(out).labels_file,
+        POINTS,
+        np.zeros((5, 3), np.uint8),
+        PointLabels(LABELS),
+        ("cup",),
+        NUMBERS,
+        ["thing-0007", "x"],
     )
     with pytest.raises(InputError, match=r"labels\.ply.*2 points for thing-0007.*found 1"):
         ObjectMap.load(out).points("thing-0007")
@@ -145,7 +151,9 @@ def test_a_damaged_cloud_is_named(out, what):
     elif what == "cut":
         file.write_bytes(file.read_bytes()[:-20])
     else:
-        OutputFolder(out).write_labels(POINTS, np.zeros((5, 3), np.uint8), PointLabels(LABELS), ("cup", "bowl"))
+        write_labels(
+            OutputFolder(out).labels_file, POINTS, np.zeros((5, 3), np.uint8), PointLabels(LABELS), ("cup", "bowl")
+        )
     with pytest.raises(InputError, match=r"labels\.ply.*thingmap label"):
         ObjectMap.load(out).points("thing-0007")
 

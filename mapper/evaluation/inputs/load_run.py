@@ -26,7 +26,6 @@ from ...map.store import AGAIN, OutputFolder
 from ..result import NotEvaluated
 from .case import KeyframePoses, MappedRun, Snapshot
 
-LABELS_FILE = "labels.ply"
 SNAPSHOT_INDEX = "index.json"
 SNAPSHOT_SCHEMA = "thingmap-snapshots/1"
 STAMP_ROUNDING = 1e-5  # s; files of trajectories hold microseconds
@@ -127,10 +126,11 @@ def _is_covariance(matrix: np.ndarray) -> bool:
 
 
 def _read_cloud(folder: OutputFolder, object_map: ObjectMap) -> tuple[np.ndarray, np.ndarray | None]:
-    labelled = folder.path / LABELS_FILE
-    if labelled.is_file():
-        points, labels = read_labels(labelled, object_map.classes)
+    if folder.labels_file.is_file():
+        points, labels = read_labels(folder.labels_file, object_map.classes)
         return points, labels.label
     if not folder.cloud_file.is_file():
-        raise NotEvaluated(f"the run has no cloud: there is neither {folder.cloud_file.name} nor {LABELS_FILE}")
+        raise NotEvaluated(
+            f"the run has no cloud: there is neither {folder.cloud_file.name} nor {folder.labels_file.name}"
+        )
     return folder.read_cloud()[0], None
