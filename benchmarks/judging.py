@@ -28,8 +28,16 @@ Job = TypeVar("Job", bound=SceneJob)
 Result = TypeVar("Result")
 
 
+def name_of_scene(job: SceneJob) -> str:
+    """Enough where each scene is judged once."""
+    return job.scene.name
+
+
 def judge_all(
-    judge: Callable[[Job], Result], jobs: Sequence[Job], processes: int, name: Callable[[Job], str]
+    judge: Callable[[Job], Result],
+    jobs: Sequence[Job],
+    processes: int,
+    name: Callable[[Job], str] = name_of_scene,
 ) -> list[Result]:
     """What `judge` makes of each job, in their order; scenes are rendered if absent, and `name` is what is reported."""
     for job in jobs:

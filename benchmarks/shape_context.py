@@ -60,12 +60,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
             evidence = evidence_file(folder, model)
             if not (options.reuse and evidence.is_file()):
                 learn_evidence(model, folder, options.quick)
-            of_tracks = judge_file(folder, model)
-            if not (options.reuse and of_tracks.is_file()):
+            judge = judge_file(folder, model)
+            if not (options.reuse and judge.is_file()):
                 learn_judge(model, folder, options.quick)
-            known = folder, model, evidence, of_tracks
-            limits = thresholds(judge([Job(s, *known) for s in threshold_scenes(options.quick)], options.jobs))
-            judged = judge([Job(s, *known, limits) for s in held_out_scenes(options.quick)], options.jobs)
+            known = folder, model, evidence, judge
+            jobs = [Job(s, *known) for s in threshold_scenes(options.quick)]
+            limits = thresholds(judge_all(judge_scene, jobs, options.jobs))
+            jobs = [Job(s, *known, limits) for s in held_out_scenes(options.quick)]
+            judged = judge_all(judge_scene, jobs, options.jobs)
         except UserError as error:
             print(f"error: {error}", file=sys.stderr)
             return 2
@@ -91,11 +93,6 @@ def threshold_scenes(quick: bool = False) -> list[Scene]:
     """Where thresholds come from."""
     seeds, frames = (THRESHOLD_SEEDS[:1], QUICK_FRAMES) if quick else (THRESHOLD_SEEDS, THRESHOLD_FRAMES)
     return [Scene(Preset.TABLETOP, level, seed, frames) for level in ClutterLevel for seed in seeds]
-
-
-def judge(jobs: Sequence[Job], processes: int) -> list[JudgedScene]:
-    """So many at a time; scenes are rendered if absent."""
-    return judge_all(judge_scene, jobs, processes, lambda job: job.scene.name)
 
 
 def describe(judged: Sequence[JudgedScene], limits: Thresholds) -> str:
