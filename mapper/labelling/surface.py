@@ -1,7 +1,7 @@
 """The surface that a frame shows at some of its pixels: points, normals and colours.
 
 `point_grid` of the detectors makes a cleaner grid of squares; here points are those of single pixels, which evidence
-belongs to, and noise goes in the mean over a voxel's points. It also takes three times as long (10 ms).
+belongs to, and noise goes in the mean over a voxel's points. It also takes 10 ms instead of one.
 """
 
 from __future__ import annotations
@@ -42,49 +42,66 @@ def surface_of(frame: Frame, uv: np.ndarray) -> Surface:
     """
     k, (height, width) = frame.intrinsics, frame.depth.shape
     uv = np.ascontiguousarray(uv, dtype=np.int32)
-    if len(uv) and not ((uv >= 0) & (uv < (width, height))).all():
-        raise ValueError(f"pixels must lie in the image of {width} x {height}")
-    camera = np.array([k.fx, k.fy, k.cx, k.cy])
     depth, color = np.ascontiguousarray(frame.depth, dtype=np.float32), np.ascontiguousarray(frame.color)
-    points, normals, colours, without_depth = _surface(depth, color, uv, camera)
+    across, down = (np.arange(width) - k.cx) / k.fx, (np.arange(height) - k.cy) / k.fy
+    camera = np.array([k.fx, k.fy, k.cx, k.cy])
+    points, normals, colours, outside, without_depth = _surface(depth, color, uv, camera, across, down)
+    if outside:
+        raise ValueError(f"pixels must lie in the image of {width} x {height}")
     if without_depth:
         raise ValueError(f"every pixel must have a depth, but {without_depth} of {len(uv)} have none")
     return Surface(points, normals, colours)
 
 
-@njit(cache=True, nogil=True)
-def _surface(depth, color, uv, camera):  # pragma: no cover
+@njit(cache=True, nogil=True, error_model="numpy")
+def _surface(depth, color, uv, camera, across, down):  # pragma: no cover
     """A plane has 1 / z = a u + b v + c; its normal is the gradient of that with respect to the viewing ray, and minus
-    that points to the camera."""
+    that points to the camera.
+
+    Args:
+        across, down: (W,) and (H,) x / z of each column and y / z of each row, divided once and not at each pixel.
+    """
     fx, fy, cx, cy = camera
-    count, without_depth = len(uv), 0
+    height, width = depth.shape
+    count, outside, without_depth = len(uv), 0, 0
     points, normals = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
     colours = np.empty((count, 3), np.uint8)
+    absent = np.float32(np.nan)
     for p in range(count):
-        u, v = uv[p]
+        u, v = np.int64(uv[p, 0]), np.int64(uv[p, 1])
+        if not (0 <= u < width and 0 <= v < height):
+            outside += 1
+            continue
         z = depth[v, u]
         if not 0.0 < z < np.inf:
             without_depth += 1
             continue
-        points[p, 0], points[p, 1], points[p, 2] = (u - cx) / fx * z, (v - cy) / fy * z, z
+        points[p, 0], points[p, 1], points[p, 2] = across[u] * z, down[v] * z, z
         colours[p, 0], colours[p, 1], colours[p, 2] = color[v, u, 0], color[v, u, 1], color[v, u, 2]
-        a, b = _slope(depth, u, v, 1, 0), _slope(depth, u, v, 0, 1)
+        left = depth[v, u - REACH] if u >= REACH else absent
+        right = depth[v, u + REACH] if u + REACH < width else absent
+        above = depth[v - REACH, u] if v >= REACH else absent
+        below = depth[v + REACH, u] if v + REACH < height else absent
+        a, b = _slope(left, z, right), _slope(above, z, below)
         x, y, w = a * fx, b * fy, 1.0 / z - a * (u - cx) - b * (v - cy)
         length = -np.sqrt(x * x + y * y + w * w)
         normals[p, 0], normals[p, 1], normals[p, 2] = x / length, y / length, w / length
-    return points, normals, colours, without_depth
+    return points, normals, colours, outside, without_depth
 
 
-@njit(cache=True, nogil=True)
-def _slope(depth, u, v, across, down):  # pragma: no cover
-    """Of 1 / z a pixel, along a row or a column: of the sides that are of one surface with the middle; NaN if none."""
-    height, width = depth.shape
-    z, first, last, span = depth[v, u], np.float32(1.0) / depth[v, u], np.float32(1.0) / depth[v, u], 0
-    u0, v0, u1, v1 = u - REACH * across, v - REACH * down, u + REACH * across, v + REACH * down
-    if u0 >= 0 and v0 >= 0 and abs(depth[v0, u0] - z) < SAME_SURFACE * z:
-        first = np.float32(1.0) / depth[v0, u0]
+@njit(cache=True, nogil=True, error_model="numpy")
+def _slope(before, z, after):  # pragma: no cover
+    """Of 1 / z a pixel, along a row or a column: of the sides that are of one surface with the middle; NaN if none.
+
+    Sides are numbers (NaN outside of the image), not places in `depth`: numba counts an array's users in every call
+    that is given one, which took more than half the time of all (34 000 pixels: 1.3 ms, and 0.6 without).
+    """
+    first = last = np.float32(1.0) / z
+    span = 0
+    if abs(before - z) < SAME_SURFACE * z:
+        first = np.float32(1.0) / before
         span += REACH
-    if u1 < width and v1 < height and abs(depth[v1, u1] - z) < SAME_SURFACE * z:
-        last = np.float32(1.0) / depth[v1, u1]
+    if abs(after - z) < SAME_SURFACE * z:
+        last = np.float32(1.0) / after
         span += REACH
     return (last - first) / np.float32(span) if span > 0 else np.float32(np.nan)

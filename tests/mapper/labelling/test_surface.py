@@ -95,6 +95,7 @@ def test_pixels_without_depth_or_outside_are_refused() -> None:
     depth[5, 7] = 0.0
     with pytest.raises(ValueError, match="1 of 2 have none"):
         surface_of(frame_of(depth), np.array([[7, 5], [8, 5]]))
-    with pytest.raises(ValueError, match="80 x 60"):
-        surface_of(frame_of(depth), np.array([[80, 5]]))
+    for outside in ([80, 5], [5, 60], [-1, 5], [5, -1]):
+        with pytest.raises(ValueError, match="80 x 60"):
+            surface_of(frame_of(depth), np.array([outside]))
     assert surface_of(frame_of(depth), np.empty((0, 2), np.int32)).points.shape == (0, 3)
