@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .class_slots import add_some_classes
 from .voxel_hash import (
     CELL,
     CLASSES,
@@ -15,7 +16,6 @@ from .voxel_hash import (
     POINTS,
     SUMS,
     add_points,
-    add_some_classes,
     fill_table,
 )
 
@@ -26,7 +26,7 @@ TABLE_PLACES = 4  # of the hash table for each row, at most
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KeptClasses:
-    """The classes of V voxels that keep only some, U in all (see `voxel_hash`).
+    """The classes of V voxels that keep only some, U in all (see `class_slots`).
 
     Attributes:
         taken: (V,) uint8, how many a voxel has.
@@ -51,7 +51,7 @@ class FrozenSubmap:
         cells: (V, 3) int32, anchor's axes.
         counts: (V, 2) int32 points and views.
         sums: (V, 9) float32: positions in the cell, in its edges; RGB; normals, anchor's axes.
-        class_sums: (V, K + 1) float32 ln p, or (V, 4) where only some classes are kept (see `voxel_hash`).
+        class_sums: (V, K + 1) float32 ln p, or (V, 4) where only some classes are kept (see `class_slots`).
         kept: those, or None.
 
     Raises:

@@ -16,7 +16,7 @@ class VoxelConfig:
         pixel_step: every so many pixels of every so many rows are looked at: at 3, a voxel 1 m from a Kinect has three
             of each frame, one 2 m away has one. 2 takes 2.2 times as long and labels three training tables no better
             (macro F .863 and .858).
-        kept_classes: classes that a voxel keeps apart; with no more in all nothing is lost, see `voxel_hash`. Eight
+        kept_classes: classes that a voxel keeps apart; with no more in all nothing is lost, see `class_slots`. Eight
             hold the few that detectors confuse with each other.
         submap_radius: metres from its anchor, beyond which a camera's frames begin a new submap: half the range.
         submap_keyframes: after which a new submap begins. 20 of 6 cm or 5 degrees are a metre or a quarter turn, over

@@ -1,25 +1,7 @@
 """The loops that add a frame's points to a growing table of voxels.
 
-A voxel's row is found by open addressing: `table` holds rows, `keys` the cell of each row as one number. What a voxel
-has of K classes is held in one of two forms.
-
-Few classes (no more than a voxel keeps): (K + 1) sums of ln p, the background's last. Exact.
-
-Many classes: most frames say the same least value of most classes, so that only what exceeds the least value of a point
-(its floor) is told apart, and of only S classes, in slots. The floors' sum, common to all classes, and the
-background's are exact. A class has its excess v in a slot, and may have lost some before it got there, at most d. All
-the others have lost at most D. A point adds to the v of the classes with a slot; of the others, while the one of the
-greatest excess w there may have more by now than the least of the slots, w + D > v + d, it takes that slot (d = D), and
-D becomes the v + d of the one that goes; when none does any more, D becomes w + D of the greatest that is left, if that
-is more. (The Space-Saving algorithm of Metwally et al., 2005, for points that speak of many classes at once.) What was
-lost in all is shared by the classes without a slot. Hence
-
-    no class is off by more than D, in either direction;
-    D = 0 as long as no more than S classes have any excess;
-    D <= sum of all excesses / S, as all v + d together never exceed that sum, and D none of them;
-    D <= sum over points of the greatest excess.
-
-Divided by the number of points, D bounds the error of the mean ln p of equation (7), in nats.
+A voxel's row is found by open addressing: `table` holds rows, which begin with their cells. What a row has of K classes
+is in one of two forms, see `class_slots`.
 """
 
 from __future__ import annotations
@@ -32,7 +14,6 @@ from ..trajectory.cloud import KEY_BITS
 FREE = 0  # places of the table hold rows + 1, and slots classes + 1: memory that is not touched yet is zero
 CELL, POINTS, VIEWS, LAST_FRAME, SUMS, CLASSES = 0, 3, 4, 5, 6, 15  # columns of a row: integers up to SUMS, then floats
 GEOMETRY = CLASSES - SUMS  # sums: position in the cell (in its edges) 3, RGB 3, normal 3
-FLOOR, BACKGROUND, LOST, BOUND = range(CLASSES, CLASSES + 4)  # columns from CLASSES on where voxels have slots
 BATCH = 512  # points whose rows are fetched together
 
 
@@ -141,66 +122,3 @@ def fill_table(table, ints, used):  # pragma: no cover
     for row in range(used):
         i, j, k = ints[row, 0], ints[row, 1], ints[row, 2]
         table[find(table, ints, _place(table, i, j, k), i, j, k)] = row + 1
-
-
-@njit(cache=True, nogil=True)
-def add_some_classes(rows, log_p, floats, ids, values, before):  # pragma: no cover
-    """Add (P, K + 1) log probabilities where voxels have slots.
-
-    Args:
-        rows: (P,) of the points.
-        log_p: (P, K + 1), the background's last.
-        floats: (V, C) with the columns FLOOR, BACKGROUND, LOST and BOUND (D).
-        ids: (V, S) classes + 1 in slots, the taken slots first, then FREE.
-        values: (V, S) their excess since they are there (v); 0 in free ones.
-        before: (V, S) what they can have lost before (d); 0 in free ones.
-    """
-    classes = log_p.shape[1] - 1
-    done = np.full(classes, -1, np.int64)  # the last point whose excess of the class is accounted for
-    for p in range(len(rows)):
-        row = np.int64(rows[p])
-        floor, greatest = _range(log_p[p, :classes])
-        floats[row, FLOOR] += floor
-        floats[row, BACKGROUND] += log_p[p, classes]
-        if greatest == floor:
-            continue
-        for s in range(ids.shape[1]):
-            if ids[row, s] != FREE:
-                c = ids[row, s] - 1
-                values[row, s] += log_p[p, c] - floor
-                done[c] = p
-        _add_others(p, log_p[p, :classes], floor, done, floats[row], ids[row], values[row], before[row])
-
-
-@njit(cache=True, nogil=True, fastmath=True)
-def _range(values):  # pragma: no cover
-    least = greatest = values[0]
-    for c in range(1, len(values)):
-        least, greatest = min(least, values[c]), max(greatest, values[c])
-    return least, greatest
-
-
-@njit(cache=True, nogil=True)
-def _add_others(p, log_p, floor, done, floats, ids, values, before):  # pragma: no cover
-    """The classes of a point that had no slot."""
-    lost_before = floats[BOUND]
-    while True:
-        greatest, total, best = np.float32(0.0), np.float32(0.0), -1
-        for c in range(len(log_p)):
-            if done[c] != p:
-                excess = log_p[c] - floor
-                total += excess
-                if excess > greatest:
-                    greatest, best = excess, c
-        if best < 0:
-            return
-        at = np.argmin(values + before)
-        least = values[at] + before[at]
-        if greatest + lost_before <= least:
-            floats[LOST] += total
-            floats[BOUND] = max(floats[BOUND], greatest + lost_before)
-            return
-        floats[LOST] += values[at]
-        floats[BOUND] = max(floats[BOUND], least)
-        ids[at], values[at], before[at] = best + 1, greatest, lost_before
-        done[best] = p

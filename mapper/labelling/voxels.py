@@ -20,7 +20,7 @@ __all__ = ["VoxelEvidence", "Voxels"]
 
 
 class VoxelEvidence:
-    """Sums of ln p, positions, colours, normals and counts in voxels of submaps; see `voxel_hash` for many classes.
+    """Sums of ln p, positions, colours, normals and counts in voxels of submaps; see `class_slots` for many classes.
 
     A submap is the voxels of a stretch of frames, in the axes of its first keyframe, the anchor. Frames of later
     keyframes go in by what is known of their poses then; afterwards the submap is rigid and moves with its anchor. It
