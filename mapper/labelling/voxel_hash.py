@@ -144,3 +144,17 @@ def fill_table(table, ints, used):  # pragma: no cover
         while table[place] != FREE:
             place = (place + 1) & mask
         table[place] = row + 1
+
+
+@njit(cache=True, nogil=True)
+def split_rows(ints, floats, cells, counts, sums, class_sums):  # pragma: no cover
+    """Copy the first rows into arrays of their columns, in one pass: numpy's four take twice as long."""
+    for row in range(len(cells)):
+        for c in range(cells.shape[1]):
+            cells[row, c] = ints[row, CELL + c]
+        for c in range(counts.shape[1]):
+            counts[row, c] = ints[row, POINTS + c]
+        for c in range(sums.shape[1]):
+            sums[row, c] = floats[row, SUMS + c]
+        for c in range(class_sums.shape[1]):
+            class_sums[row, c] = floats[row, CLASSES + c]

@@ -76,9 +76,7 @@ class VoxelEvidence:
         arrays = self._checked(points, normals, colours, log_p, T)
         T_anchor_keyframe = self._place(keyframe, T, T_world_keyframe)
         if T_anchor_keyframe is None:
-            self._finish()
-            self._active = Submap(keyframe, len(self.classes), self.config.kept_classes, self.config.voxel_size)
-            T_anchor_keyframe = np.eye(4)
+            self._active, T_anchor_keyframe = self._begun(keyframe), np.eye(4)
         assert self._active is not None
         self.frames += 1
         self._active.keyframes.setdefault(keyframe, T_anchor_keyframe)
@@ -108,10 +106,13 @@ class VoxelEvidence:
         near = np.linalg.norm((T_anchor_keyframe @ T)[:3, 3]) <= c.submap_radius
         return T_anchor_keyframe if near else None
 
-    def _finish(self) -> None:
-        if self._active is not None:
-            self._store.add(self._active.freeze())
-            self._active = None
+    def _begun(self, keyframe: int) -> Submap:
+        """A submap without voxels; the one that grew is finished."""
+        if (active := self._active) is None:
+            return Submap(keyframe, len(self.classes), self.config.kept_classes, self.config.voxel_size)
+        self._store.add(active.freeze())
+        active.begin_again(keyframe)
+        return active
 
     def assemble(self, T_world_keyframe: np.ndarray) -> Voxels:
         """The voxels of the world under (M, 4, 4) poses of the keyframes; what was gathered stays as it is.
