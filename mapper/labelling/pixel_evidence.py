@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from ...datasets.frame import Frame
 
@@ -56,6 +57,16 @@ class PixelEvidence:
 
 def pixel_grid(frame: Frame, step: int, near: float, far: float) -> np.ndarray:
     """(P, 2) int32: every `step`-th column of every `step`-th row whose depth is in [near, far], metres, row by row."""
-    depth = frame.depth[::step, ::step]
-    rows, columns = np.nonzero((depth >= max(near, np.finfo(np.float32).tiny)) & (depth <= far))
-    return (np.stack([columns, rows], axis=1) * step).astype(np.int32)
+    depth = np.ascontiguousarray(frame.depth, dtype=np.float32)
+    return _in_range(depth, step, max(np.float32(near), np.finfo(np.float32).tiny), np.float32(far))
+
+
+@njit(cache=True, nogil=True)
+def _in_range(depth, step, near, far) -> np.ndarray:  # pragma: no cover
+    height, width = depth.shape
+    uv, count = np.empty((-(-height // step) * -(-width // step), 2), np.int32), 0
+    for v in range(0, height, step):
+        for u in range(0, width, step):
+            uv[count, 0], uv[count, 1] = u, v
+            count += near <= depth[v, u] <= far
+    return uv[:count]

@@ -90,10 +90,22 @@ def _of_detections(frame: Frame, detections: Detections, step: int, config: Sour
     masks = np.zeros((len(found), rows, columns), dtype=bool) if found.mask is None else found.mask[:, ::step, ::step]
     has_mask = masks.any(axis=(1, 2))
     refine(p, _every(frame, step), _boxes_of(found.select(np.flatnonzero(~has_mask)), step, config.least), config.gamma)
-    for n in np.flatnonzero(has_mask):
-        own = np.nan_to_num(found.scores[n]).astype(np.float32)
-        p[:, masks[n]] = np.maximum(p[:, masks[n]], own[:, None])
+    _cover(p, masks, has_mask, np.nan_to_num(found.scores).astype(np.float32))
     return p
+
+
+@njit(cache=True, nogil=True)
+def _cover(p, masks, has_mask, scores) -> None:  # pragma: no cover
+    """(K, H, W) p becomes the greatest of itself and, in each of (N, H, W) masks, of its (N, K) scores, where (N,) say
+    that there is one."""
+    classes, height, width = p.shape
+    for n in range(len(masks)):
+        if has_mask[n]:
+            for v in range(height):
+                for u in range(width):
+                    if masks[n, v, u]:
+                        for k in range(classes):
+                            p[k, v, u] = max(p[k, v, u], scores[n, k])
 
 
 def _every(frame: Frame, step: int) -> Frame:
