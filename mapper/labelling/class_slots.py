@@ -42,51 +42,66 @@ def add_some_classes(rows, log_p, floats, ids, values, before):  # pragma: no co
         before: (V, S) what they can have lost before (d); 0 in free ones.
     """
     classes = log_p.shape[1] - 1
-    done = np.full(classes, -1, np.int64)  # the last point whose excess of the class is accounted for
+    excess = np.empty(classes, np.float32)  # of the classes of a point that are not accounted for yet, else 0
+    floors, speaks = _floors(log_p)
     for p in range(len(rows)):
         row = np.int64(rows[p])
-        floor, greatest = _range(log_p[p, :classes])
-        floats[row, FLOOR] += floor
+        floats[row, FLOOR] += floors[p]
         floats[row, BACKGROUND] += log_p[p, classes]
-        if greatest == floor:
+        if not speaks[p]:
             continue
+        for c in range(classes):
+            excess[c] = log_p[p, c] - floors[p]
         for s in range(ids.shape[1]):
             if ids[row, s] != FREE:
                 c = ids[row, s] - 1
-                values[row, s] += log_p[p, c] - floor
-                done[c] = p
-        _add_others(p, log_p[p, :classes], floor, done, floats[row], ids[row], values[row], before[row])
+                values[row, s] += excess[c]
+                excess[c] = 0.0
+        _add_others(excess, floats[row], ids[row], values[row], before[row])
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def _range(values):  # pragma: no cover
-    least = greatest = values[0]
-    for c in range(1, len(values)):
-        least, greatest = min(least, values[c]), max(greatest, values[c])
-    return least, greatest
+def _floors(log_p):  # pragma: no cover
+    """The least value of each point's classes, and whether there is any greater one."""
+    floors, speaks = np.empty(len(log_p), np.float32), np.empty(len(log_p), np.bool_)
+    for p in range(len(log_p)):
+        least = greatest = log_p[p, 0]
+        for c in range(1, log_p.shape[1] - 1):
+            least, greatest = min(least, log_p[p, c]), max(greatest, log_p[p, c])
+        floors[p], speaks[p] = least, greatest != least
+    return floors, speaks
 
 
 @njit(cache=True, nogil=True)
-def _add_others(p, log_p, floor, done, floats, ids, values, before):  # pragma: no cover
+def _add_others(excess, floats, ids, values, before):  # pragma: no cover
     """The classes of a point that had no slot."""
     lost_before = floats[BOUND]
-    while True:
-        greatest, total, best = np.float32(0.0), np.float32(0.0), -1
-        for c in range(len(log_p)):
-            if done[c] != p:
-                excess = log_p[c] - floor
-                total += excess
-                if excess > greatest:
-                    greatest, best = excess, c
-        if best < 0:
-            return
-        at = np.argmin(values + before)
-        least = values[at] + before[at]
+    greatest = _greatest(excess)
+    while greatest > 0.0:
+        at, least = 0, values[0] + before[0]
+        for s in range(1, len(values)):
+            if values[s] + before[s] < least:
+                at, least = s, values[s] + before[s]
         if greatest + lost_before <= least:
+            total = np.float32(0.0)
+            for c in range(len(excess)):
+                total += excess[c]
             floats[LOST] += total
             floats[BOUND] = max(floats[BOUND], greatest + lost_before)
             return
+        best = 0
+        while excess[best] != greatest:
+            best += 1
         floats[LOST] += values[at]
         floats[BOUND] = max(floats[BOUND], least)
         ids[at], values[at], before[at] = best + 1, greatest, lost_before
-        done[best] = p
+        excess[best] = 0.0
+        greatest = _greatest(excess)
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _greatest(excess):  # pragma: no cover
+    greatest = excess[0]
+    for c in range(1, len(excess)):
+        greatest = max(greatest, excess[c])
+    return greatest
