@@ -22,7 +22,8 @@ class Voxels:
     """N cells of the world with points in them, sorted by x, then y, then z, and what is known of each.
 
     Attributes:
-        cells: (N, 3) int32, x = floor(point / voxel size).
+        size: metres, a voxel's edge.
+        cells: (N, 3) int32, x = floor(point / size).
         points: (N, 3) float64 metres, world: mean position of the points.
         colours: (N, 3) float32 mean RGB, 0 to 255.
         normals: (N, 3) float32 unit vectors, world, towards the cameras; NaN where none is known.
@@ -34,6 +35,7 @@ class Voxels:
             where voxels keep all classes and it is exact, rounding aside.
     """
 
+    size: float
     cells: np.ndarray
     points: np.ndarray
     colours: np.ndarray
@@ -90,6 +92,7 @@ def merge(
     with np.errstate(invalid="ignore", divide="ignore"):
         normals = np.where(length > LEAST_NORMAL * n, normals / length, np.float32(np.nan))
     return Voxels(
+        size=size,
         cells=_cells(cells).astype(np.int32),
         points=points / n,
         colours=colours / n,

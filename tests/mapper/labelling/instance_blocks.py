@@ -32,6 +32,7 @@ def make_voxels(parts) -> tuple[Voxels, Labels, list[np.ndarray]]:
     row[order] = np.arange(len(cells))
     cells, n = cells[order], len(cells)
     voxels = Voxels(
+        size=0.01,
         cells=cells,
         points=(cells + 0.5) * 0.01,
         colours=np.zeros((n, 3), np.float32),

@@ -23,6 +23,7 @@ def make_voxels(cells: np.ndarray, p: np.ndarray, colours: np.ndarray | None = N
     """Voxels of a floor, (N, K + 1) probabilities."""
     n = len(cells)
     return Voxels(
+        size=0.01,
         cells=cells.astype(np.int32),
         points=(cells + 0.5) * 0.01,
         colours=np.full((n, 3), 80, np.float32) if colours is None else colours.astype(np.float32),

@@ -22,7 +22,7 @@ def test_the_probability_of_a_voxel_is_the_geometric_mean_of_its_points() -> Non
     points = [[0.001, 0.002, 1.001], [0.003, 0.002, 1.003], [0.011, 0.0, 1.001]]
     frame = one_frame(np.array(points), np.array([[0.2, 0.9], [0.8, 0.1], [0.5, 0.5]]))
     voxels = gathered([frame], VoxelConfig(), 1).assemble(HERE)
-    assert voxels.cells.tolist() == [[0, 0, 100], [1, 0, 100]]
+    assert voxels.size == 0.01 and voxels.cells.tolist() == [[0, 0, 100], [1, 0, 100]]
     np.testing.assert_allclose(np.exp(voxels.log_p), [[0.4, 0.3], [0.5, 0.5]], rtol=1e-5)
     np.testing.assert_allclose(voxels.points[0], [0.002, 0.002, 1.002], atol=1e-6)
     np.testing.assert_allclose(voxels.colours[0], [1.5, 2.5, 3.5])
