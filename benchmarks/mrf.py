@@ -87,7 +87,8 @@ def _solve(size: int, term: Smoothness) -> Solved:
     world, config = build_world(size), MrfConfig(smoothness=term)
     edges, pairs_s, _ = _timed(lambda: neighbour_pairs(world.voxels))
     colours = np.zeros_like(world.normals)  # neither term looks at them
-    energy = PottsEnergy(world.unary, edges, pair_weights(edges, world.voxels, world.normals, colours, config))
+    weights = pair_weights(edges, world.voxels, world.points, world.normals, colours, config)
+    energy = PottsEnergy(world.unary, edges, weights)
     cuts, cuts_s, cuts_wall_s = _timed(lambda: expand(energy, max_sweeps=config.max_sweeps))
     cuts_mb = _peak_mb()
     fast, fast_s, _ = _timed(lambda: mean_field(energy, config.fast_sweeps).labelling)

@@ -26,12 +26,14 @@ class VoxelWorld:
 
     Attributes:
         voxels: (N, 3) int32 cells.
+        points: (N, 3) mean positions of their points, in edges of a voxel.
         normals: (N, 3) float32 unit, outwards, with noise.
         truth: (N,) int label; the last is background.
         unary: (N, 6) float32, nats, equation (7).
     """
 
     voxels: np.ndarray
+    points: np.ndarray
     normals: np.ndarray
     truth: np.ndarray
     unary: np.ndarray
@@ -94,15 +96,18 @@ def build_world(size: int, seed: int = 0) -> VoxelWorld:
     cells, first, inverse = np.unique(
         np.floor(points / VOXEL).astype(np.int32), axis=0, return_index=True, return_inverse=True
     )
-    normals = (
-        np.stack([np.bincount(inverse.ravel(), column) for column in np.concatenate(surfaces.normals).T], axis=1)
-        / np.bincount(inverse.ravel())[:, None]
-    )
+    means = _means(inverse.ravel(), points / VOXEL)
+    normals = _means(inverse.ravel(), np.concatenate(surfaces.normals))
     normals += rng.normal(0.0, TURN, normals.shape)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     truth = labels[first]
     unary = _detections(rng, cells, points[first], truth, surfaces.things)
-    return VoxelWorld(cells, normals.astype(np.float32), truth, unary)
+    return VoxelWorld(cells, means, normals.astype(np.float32), truth, unary)
+
+
+def _means(cell: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """(C, 3) of the (P, 3) values in each cell."""
+    return np.stack([np.bincount(cell, column) for column in values.T], axis=1) / np.bincount(cell)[:, None]
 
 
 def _furnish(surfaces: _Surfaces, side: float) -> None:

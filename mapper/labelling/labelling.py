@@ -62,7 +62,7 @@ def label_voxels(voxels: Voxels, config: MrfConfig, more: np.ndarray | None = No
     normals = voxels.normals
     if config.smoothness is Smoothness.NORMALS:
         normals = surface_normals(voxels.cells, normals, config.normals_radius, config.normals_agreement)
-    weights = pair_weights(edges, voxels.cells, normals, voxels.colours, config)
+    weights = pair_weights(edges, voxels.cells, voxels.points / voxels.size, normals, voxels.colours, config)
     found = minimise(PottsEnergy(-log_p.astype(np.float32), edges, weights), config)
     label = found.labelling.labels.astype(np.int64)
     second, margin = _runners_up(log_p, label)
