@@ -31,6 +31,7 @@ class Background:
         labels: (N,) class names of the true objects in the image; empty where the source knows none.
         xyxy: (N, 4) float64 pixels, their whole boxes cut to the image, counted from its outer edges.
         visibility: (N,) visible share of each object.
+        visible: (N, 4) the boxes of what is seen of them, NaN where that is unknown; None where it is of all.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Background:
     labels: tuple[str, ...]
     xyxy: np.ndarray
     visibility: np.ndarray
+    visible: np.ndarray | None = None
 
 
 class Backgrounds:
@@ -149,8 +151,9 @@ def _of_frame(sequence: Sequence, index: int, name: str, boxes_of: Callable[[int
         raise BrokenView(f"{broken.problem.value} ({broken.detail})") from None
     boxes = KnownBoxes.none() if boxes_of is None else boxes_of(index)
     size = (sequence.intrinsics.width, sequence.intrinsics.height)
-    xyxy = np.clip(boxes.xyxy, 0.0, np.tile(np.array(size, dtype=np.float64), 2))
-    return Background(name, frame.color, frame.depth, frame.intrinsics.fx, boxes.labels, xyxy, boxes.visibility)
+    whole, visible = (np.clip(one, 0.0, np.tile(np.array(size, float), 2)) for one in (boxes.xyxy, boxes.visible))
+    seen = frame.color, frame.depth, frame.intrinsics.fx
+    return Background(name, *seen, boxes.labels, whole, boxes.visibility, visible)
 
 
 def _of_image(image: CocoImage) -> Background:

@@ -23,18 +23,20 @@ class KnownBoxes:
         labels: (N,) class names.
         object_id: (N,) int64.
         xyxy: (N, 4) float64 pixels, boxes of the whole objects, from the image's outer edges, not cut to the image.
+        visible: (N, 4) float64, the same of what is seen of them; NaN where nothing is, or nobody knows.
         visibility: (N,) share of each object that is seen.
     """
 
     labels: tuple[str, ...]
     object_id: np.ndarray
     xyxy: np.ndarray
+    visible: np.ndarray
     visibility: np.ndarray
 
     @staticmethod
     def none() -> KnownBoxes:
         """No object."""
-        return KnownBoxes((), np.zeros(0, np.int64), np.zeros((0, 4)), np.zeros(0))
+        return KnownBoxes((), np.zeros(0, np.int64), np.zeros((0, 4)), np.zeros((0, 4)), np.zeros(0))
 
 
 def known_boxes(sequence: Sequence) -> Callable[[int], KnownBoxes] | None:
@@ -65,4 +67,5 @@ def _boxes(truth: FrameTruth | None, labels: dict[int, str]) -> KnownBoxes:
         return KnownBoxes.none()
     ids = np.asarray(truth.object_id, dtype=np.int64)
     names = tuple(labels[int(number)] for number in ids)
-    return KnownBoxes(names, ids, truth.xyxy + 0.5, truth.visibility)  # truth counts from pixel centres
+    # truth counts from pixel centres
+    return KnownBoxes(names, ids, truth.xyxy + 0.5, truth.xyxy_visible + 0.5, truth.visibility)
