@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import njit
 from scipy.special import logit
 
+from ..detections import Part
 from .channels import CELL
-from .model import HogTemplate
 from .pyramid import Level
 from .scoring import part_boxes
+
+if TYPE_CHECKING:
+    from .model import HogTemplate
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,10 +72,22 @@ class Candidates:
         """Those that a boolean mask or indices name, in that order."""
         return Candidates(self.class_id[index], self.part[index], self.xyxy[index], self.probability[index])
 
+    def joined(self, other: Candidates) -> Candidates:
+        """These and others."""
+        pairs = [(getattr(self, one.name), getattr(other, one.name)) for one in fields(self)]
+        joined = Candidates(*(np.concatenate(pair) for pair in pairs))
+        return joined.select(np.argsort(-joined.probability, kind="stable"))
 
-def candidates(levels: Sequence[ScoredLevel], templates: Sequence[HogTemplate], least: float) -> Candidates:
-    """Windows of at least a probability `least`; of equal ones, those of finer levels and earlier templates first."""
-    lowest = np.array([_score_of(least, *template.platt) for template in templates], dtype=np.float32)
+
+def candidates(
+    levels: Sequence[ScoredLevel], templates: Sequence[HogTemplate], least: float, parts: Sequence[Part] = tuple(Part)
+) -> Candidates:
+    """Windows of some parts' templates, of at least a probability `least`; of equal ones, those of finer levels and
+    earlier templates first."""
+    lowest = np.array(
+        [_score_of(least, *template.platt) if template.part in parts else np.inf for template in templates],
+        dtype=np.float32,
+    )
     found: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for level in levels:
         t, i, j = np.unravel_index(np.flatnonzero(level.scores >= lowest[:, None, None]), level.scores.shape)

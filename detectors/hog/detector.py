@@ -19,6 +19,7 @@ from .pyramid import build_pyramid
 from .refinement import ClassBoxes
 from .score_vectors import score_vectors
 from .scoring import Scorer
+from .second_stage.judged import PROPOSED, JudgedWindows, cut_to_image, proposed_windows
 from .suppression import suppress
 
 SHIPPED = "hog"  # name of what is known of the shipped model
@@ -29,6 +30,9 @@ class HogDetector:
     """HOG templates on colour and depth (Lai et al. 2012, III-C), and of object halves (Explicit Occlusion, 4.1).
 
     Every detection carries the scores of all classes (see `score_vectors`). The same frame gives the same detections.
+    Where the model has a second stage, templates of whole objects only propose windows: which class each shows, if any,
+    and where the object's box is, the second stage says. Halves are by their templates alone.
+
     An image too small for any window has none. A box of an object that reaches over the image's edge is cut there.
     Pixels without a reading are filled for the depth HOG and count nothing in the histograms, also where that is all
     pixels: only a frame without a depth image at all cannot be looked at by a model that uses depth.
@@ -95,8 +99,8 @@ class HogDetector:
         Raises:
             UserError: for a frame without a depth image, if the model uses depth.
         """
-        levels = self._scored(frame)
-        return self._detections(self._of_each_class(levels, frame), levels, frame)
+        levels, judged = self._looked(frame)
+        return self._detections(self._of_each_class(levels, judged, frame), levels, judged, frame)
 
     def detect_dense(self, frame: Frame, /) -> tuple[Detections, ProbabilityMaps]:
         """The same detections, and the probability maps of the whole objects' templates.
@@ -104,15 +108,16 @@ class HogDetector:
         Raises:
             UserError: as a call.
         """
-        levels = self._scored(frame)
-        found = self._of_each_class(levels, frame)
+        levels, judged = self._looked(frame)
+        found = self._of_each_class(levels, judged, frame)
         whole = found.select(found.part == Part.WHOLE)
         boxes = ClassBoxes(whole.class_id, _clipped(whole.xyxy, frame), whole.probability)
-        maps = probability_maps(levels, self._templates, self.classes, frame, boxes, self.maps)
-        return self._detections(found, levels, frame), maps
+        most = 1.0 if judged is None else PROPOSED  # others have been judged, and are spread if they are anything
+        maps = probability_maps(levels, self._templates, self.classes, frame, boxes, self.maps, most)
+        return self._detections(found, levels, judged, frame), maps
 
-    def _scored(self, frame: Frame) -> list[ScoredLevel]:
-        """Scores of all windows at all scales."""
+    def _looked(self, frame: Frame) -> tuple[list[ScoredLevel], JudgedWindows | None]:
+        """Scores of all windows at all scales, and what the second stage says of those that may show a whole object."""
         model = self.model
         assert isinstance(model, HogModel)
         depth = frame.depth if model.channels.use_depth else None
@@ -123,31 +128,51 @@ class HogDetector:
                 "use a model trained with --channels rgb"
             )
         if self._scorer is None:
-            return []
+            return [], None
         focal = float(np.sqrt(frame.intrinsics.fx * frame.intrinsics.fy))
         pyramid = build_pyramid(frame.color, depth, focal, model.channels, model.pyramid)
         scores = self._scorer.scores(pyramid)
-        return [ScoredLevel.of(*item, self._corners) for item in zip(pyramid.levels, scores, strict=True)]
+        levels = [ScoredLevel.of(*item, self._corners) for item in zip(pyramid.levels, scores, strict=True)]
+        if model.second_stage is None:
+            return levels, None
+        proposed = proposed_windows(levels, self._templates, pyramid.width, pyramid.height)
+        return levels, JudgedWindows.of(model.second_stage, pyramid, frame.depth, focal, proposed)
 
-    def _of_each_class(self, levels: list[ScoredLevel], frame: Frame) -> Candidates:
+    def _of_each_class(self, levels: list[ScoredLevel], judged: JudgedWindows | None, frame: Frame) -> Candidates:
         """The windows that are left when those of the same class and part have suppressed each other."""
-        found = candidates(levels, self._templates, self.confidence)
+        parts = tuple(part for part in Part if judged is None or part != Part.WHOLE)
+        found = candidates(levels, self._templates, self.confidence, parts)
         boxes = _clipped(found.xyxy, frame)
         found = found.select((boxes[:, 2] > boxes[:, 0]) & (boxes[:, 3] > boxes[:, 1]))
         group = found.class_id * len(Part) + found.part
-        return found.select(suppress(_clipped(found.xyxy, frame), group, self.nms_iou, self.max_detections))
+        found = found.select(suppress(_clipped(found.xyxy, frame), group, self.nms_iou, self.max_detections))
+        if judged is None:
+            return found
+        return judged.of_each_class(self.confidence, self.nms_iou, self.max_detections).joined(found)
 
-    def _detections(self, found: Candidates, levels: list[ScoredLevel], frame: Frame) -> Detections:
+    def _detections(
+        self, found: Candidates, levels: list[ScoredLevel], judged: JudgedWindows | None, frame: Frame
+    ) -> Detections:
         """What is left of the windows of each class, with their scores."""
-        if self.merge:
-            boxes = _clipped(found.xyxy, frame)
-            found = found.select(suppress(boxes, found.part, self.nms_iou, self.max_detections))
-            scores = score_vectors(found, levels, self._templates, len(self.classes), self.nms_iou)
-        else:
+        if not self.merge:
             scores = np.full((len(found), len(self.classes)), np.nan)
             scores[np.arange(len(found)), found.class_id] = found.probability
-        order = np.argsort(-np.nanmax(scores, axis=1, initial=0.0), kind="stable")
-        return Detections(self.classes, _clipped(found.xyxy, frame)[order], scores[order], found.part[order])
+            return _sorted(self.classes, _clipped(found.xyxy, frame), scores, found.part)
+        if judged is not None:
+            found = found.select(found.part != Part.WHOLE)
+        found = found.select(suppress(_clipped(found.xyxy, frame), found.part, self.nms_iou, self.max_detections))
+        boxes, part = _clipped(found.xyxy, frame), found.part
+        scores = score_vectors(found, levels, self._templates, len(self.classes), self.nms_iou)
+        if judged is not None:
+            whole = judged.merged(self.confidence, self.nms_iou, self.max_detections)
+            boxes, scores = np.concatenate([whole.xyxy, boxes]), np.concatenate([whole.scores, scores])
+            part = np.concatenate([np.full(len(whole.xyxy), Part.WHOLE, part.dtype), part])
+        return _sorted(self.classes, boxes, scores, part)
+
+
+def _sorted(classes: tuple[str, ...], xyxy: np.ndarray, scores: np.ndarray, part: np.ndarray) -> Detections:
+    order = np.argsort(-np.nanmax(scores, axis=1, initial=0.0), kind="stable")
+    return Detections(classes, xyxy[order], scores[order], part[order])
 
 
 def _evidence_beside(model: Path) -> str:
@@ -156,5 +181,4 @@ def _evidence_beside(model: Path) -> str:
 
 
 def _clipped(xyxy: np.ndarray, frame: Frame) -> np.ndarray:
-    height, width = frame.color.shape[:2]
-    return np.clip(xyxy, 0.0, np.array([width, height, width, height], dtype=np.float64))
+    return cut_to_image(xyxy, frame.color.shape[1], frame.color.shape[0])

@@ -60,6 +60,7 @@ def probability_maps(
     frame: Frame,
     found: ClassBoxes,
     config: MapConfig,
+    most: float = 1.0,
 ) -> ProbabilityMaps:
     """Maps of the whole templates' classes, refined by boxes.
 
@@ -70,11 +71,12 @@ def probability_maps(
         frame: for its size, depth and intrinsics.
         found: boxes of whole objects, of which those of `refined_from` and more are spread.
         config: numbers.
+        most: probability of a window, beyond which only boxes are asked: those of a second stage.
     """
     height, width = frame.color.shape[:2]
     log_odds = _joined(levels, templates, len(classes), width, height)
     np.clip(log_odds, *np.log([LEAST / (1 - LEAST), (1 - LEAST) / LEAST]).astype(np.float32), out=log_odds)
-    p = 1.0 / (1.0 + np.exp(-log_odds))
+    p = np.minimum(1.0 / (1.0 + np.exp(-log_odds)), np.float32(most))
     sure = found.probability >= config.refined_from
     refine(p, frame, ClassBoxes(found.class_id[sure], found.xyxy[sure], found.probability[sure]), config.gamma)
     return ProbabilityMaps.of(classes, p, config.alpha)

@@ -16,6 +16,8 @@ from ..model_file import read_document, write_document
 from ..platt import probability
 from .channels import Channels
 from .config import PyramidConfig
+from .second_stage.network import WindowNetwork
+from .second_stage.window_views import view_size
 
 SCHEMA = "thingmap-hog/1"
 KIND = "a HOG model"
@@ -79,9 +81,11 @@ class HogModel:
         templates: at least one; any number for each class and part.
         pyramid: the scales at which the model is to be used.
         about: where it comes from (seed, sources, counts, version of the program): anything that JSON can hold.
+        second_stage: looks again at the windows that the whole objects' templates propose; None for a model that has
+            none. It needs depth.
 
     Raises:
-        ValueError: no template, or one that does not fit the classes or the channels.
+        ValueError: no template, or one that does not fit the classes or the channels, or a second stage that does not.
     """
 
     classes: tuple[str, ...]
@@ -89,6 +93,7 @@ class HogModel:
     templates: tuple[HogTemplate, ...]
     pyramid: PyramidConfig
     about: Mapping[str, Any]
+    second_stage: WindowNetwork | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "classes", checked_classes(self.classes))
@@ -103,6 +108,18 @@ class HogModel:
             if template.weights.shape[2] != self.channels.count:
                 found = template.weights.shape[2]
                 raise ValueError(f"{self.channels} has {self.channels.count} channels, but a template has {found}")
+        self._check_second_stage()
+
+    def _check_second_stage(self) -> None:
+        network, classes = self.second_stage, len(self.classes)
+        if network is None:
+            return
+        if not self.channels.use_depth:
+            raise ValueError("a second stage needs a model that looks at depth")
+        expected = view_size(self.channels.count, classes), classes
+        if (network.inputs, network.classes) != expected:
+            found = network.inputs, network.classes
+            raise ValueError(f"the second stage is for {found} numbers and classes, and not for {expected}")
 
     def save(self, path: str | Path) -> None:
         """Write a .npz of arrays and one JSON document (see `model_file`), whole or not at all.
@@ -129,6 +146,9 @@ class HogModel:
             "pyramid": asdict(self.pyramid),
             "about": dict(self.about),
         }
+        if self.second_stage is not None:
+            document["second_stage"] = {"layers": len(self.second_stage.weights)}
+            arrays |= self.second_stage.arrays()
         write_document(Path(path), document, arrays)
 
 
@@ -147,6 +167,7 @@ def load_model(path: str | Path) -> HogModel:
             tuple(_template(row, arrays[_array_name(i)]) for i, row in enumerate(document["templates"])),
             PyramidConfig(**document["pyramid"]),
             document["about"],
+            _second_stage(document, arrays),
         )
     except KeyError as error:
         raise InputError(path, f"{KIND} ({SCHEMA})", f"no {error.args[0]!r} in it", REMEDY) from None
@@ -161,6 +182,12 @@ def shipped_model() -> Path:
 
 def _array_name(index: int) -> str:
     return f"weights_{index}"
+
+
+def _second_stage(document: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> WindowNetwork | None:
+    if "second_stage" not in document:
+        return None
+    return WindowNetwork.of_arrays(arrays, int(document["second_stage"]["layers"]))
 
 
 def _template(row: Mapping[str, Any], weights: np.ndarray) -> HogTemplate:
