@@ -4,7 +4,7 @@ uv run python benchmarks/hog.py --folder DIR --write        all of it: scenes, t
 uv run python benchmarks/hog.py --quick                     one scene each, and models of a minute's training
 
 The model on colour and depth is the shipped one. Those on colour or depth alone are trained by `hog_model.py` in the
-same way; what is in DIR is used again.
+same way; what is in DIR is used again. Templates are judged, without what a second stage makes of their windows.
 """
 
 from __future__ import annotations

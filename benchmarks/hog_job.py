@@ -100,7 +100,7 @@ def judge_scene(job: Job) -> JudgedScene:
     truth, model = open_truth(scene_folder(job.scene, job.folder)), load_model(job.model)
     _check(truth, model, job)
     assert truth.sequence is not None and truth.frame_truth is not None
-    detector = HogDetector(model, confidence=CONFIDENCE)
+    detector = HogDetector(replace(model, second_stage=None), confidence=CONFIDENCE)
     matches: dict[Part, list[Matches]] = {part: [] for part in Part}
     sights, seconds = [], []
     for number in range(0, len(truth.sequence), job.step):
