@@ -19,7 +19,7 @@ from .pyramid import build_pyramid
 from .refinement import ClassBoxes
 from .score_vectors import score_vectors
 from .scoring import Scorer
-from .second_stage.judged import PROPOSED, JudgedWindows, cut_to_image, proposed_windows
+from .second_stage.judged import JudgedWindows, cut_to_image, proposed_windows
 from .suppression import suppress
 
 SHIPPED = "hog"  # name of what is known of the shipped model
@@ -112,8 +112,9 @@ class HogDetector:
         found = self._of_each_class(levels, judged, frame)
         whole = found.select(found.part == Part.WHOLE)
         boxes = ClassBoxes(whole.class_id, _clipped(whole.xyxy, frame), whole.probability)
-        most = 1.0 if judged is None else PROPOSED  # others have been judged, and are spread if they are anything
-        maps = probability_maps(levels, self._templates, self.classes, frame, boxes, self.maps, most)
+        maps = probability_maps(
+            levels, self._templates, self.classes, frame, boxes, self.maps, judged=judged is not None
+        )
         return self._detections(found, levels, judged, frame), maps
 
     def _looked(self, frame: Frame) -> tuple[list[ScoredLevel], JudgedWindows | None]:
