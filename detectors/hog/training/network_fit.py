@@ -24,9 +24,13 @@ LEAST_SPREAD = 0.02  # of features, which are 0 to 0.4: one that hardly differs 
 class FitConfig:
     """How the network is learned.
 
+    Measured on 180 frames of six rendered tables (seeds 41 and 42), boxes of all classes together: average precision
+    0.637 by the templates, 0.785 with the numbers here (learned from 1800 frames of tables).
+
     Attributes:
-        hidden: units of the layers between.
-        dropout: shares of what enters each layer that are left out at random.
+        hidden: units of the layers between; 0.788 with 128 in the first, twice the file.
+        dropout: shares of what enters each layer that are left out at random; 0.745 with 0.2, 0.5, 0.25, and 0.680 with
+            0.5, 0.5, 0.25.
         epochs: times that all windows are gone through.
         batch: windows of a step.
         rate: of Adam, at most.
