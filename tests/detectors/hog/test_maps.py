@@ -178,9 +178,11 @@ def test_background_is_what_the_surest_class_leaves():
     assert ProbabilityMaps.of((), np.zeros((0, 2, 3), np.float32), 0.5).background == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize("keywords", [{"gamma": -1.0}, {"refined_from": 1.1}, {"judged_from": -0.1}, {"alpha": 0.0}, {"gamma": np.nan}])
+@pytest.mark.parametrize(
+    "keywords", [{"gamma": -1.0}, {"refined_from": 1.1}, {"judged_from": -0.1}, {"alpha": 0.0}, {"gamma": np.nan}]
+)
 def test_numbers_out_of_range(keywords: dict[str, float]):
-    with pytest.raises(UserError, match="gamma >= 0, refined_from and judged_from in"):
+    with pytest.raises(UserError, match=r"gamma >= 0, refined_from and judged_from in"):
         MapConfig(**keywords)
 
 
