@@ -7,15 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from thingmap.datasets.errors import InputError
 from thingmap.datasets.frame import Frame
 from thingmap.detectors.detections import Part
 from thingmap.detectors.hog.channels import Channels
 from thingmap.detectors.hog.detector import HogDetector
-from thingmap.detectors.hog.model import HogModel
+from thingmap.detectors.hog.model import HogModel, load_model
 from thingmap.detectors.hog.score_vectors import LEAST
 from thingmap.detectors.hog.second_stage.judged import PROPOSED, JudgedWindows
 from thingmap.detectors.hog.second_stage.network import WindowNetwork
 from thingmap.detectors.hog.second_stage.window_views import view_size
+from thingmap.detectors.model_file import read_document, write_document
 
 INPUTS = view_size(Channels.RGBD.count, 2)
 CLASS = INPUTS - 2  # where the template's class is told
@@ -106,10 +108,6 @@ def test_models_whose_second_stage_does_not_fit(model: HogModel, make_model):
 
 
 def test_there_and_back(model: HogModel, tmp_path):
-    from thingmap.datasets.errors import InputError
-    from thingmap.detectors.hog.model import load_model
-    from thingmap.detectors.model_file import read_document, write_document
-
     full = replace(model, second_stage=says())
     full.save(tmp_path / "a.npz")
     back = load_model(tmp_path / "a.npz")
