@@ -77,7 +77,7 @@ def test_a_bowls_floor_is_its_walls_where_its_own_evidence_denies_it() -> None:
     voxels, surface = bowl_on_a_table()
     floor, right = floor_of(voxels, surface), np.where(surface == AROUND, NO_OBJECT, BOWL)
     log_p = voxels.log_p.copy()
-    log_p[floor] = np.log([0.05, 0.30])
+    log_p[floor] = np.log([0.02, 0.30])
     denied = replace(voxels, log_p=log_p)
     assert (label_voxels(denied, MrfConfig()).label == right).all()
     steps_alone = label_voxels(denied, MrfConfig(concave_from=0.0)).label
