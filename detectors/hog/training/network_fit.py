@@ -17,7 +17,7 @@ UNKNOWN = -1  # label of a window that neither shows an object nor clearly none
 BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8  # of Adam (Kingma and Ba 2015)
 WARM_UP = 0.3  # share of the steps in which the rate rises, as in one-cycle schedules
 NEAR = 0.1  # offset from which on a wrong box costs in proportion, not as the square (smooth L1)
-LEAST_SPREAD = 0.02  # of features, which are 0 to 0.4: one that hardly differs in training must not decide elsewhere
+LEAST_SPREAD = 1e-3  # is added: some numbers are all the same
 
 
 @dataclass(frozen=True, slots=True)

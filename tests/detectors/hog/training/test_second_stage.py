@@ -83,9 +83,10 @@ def test_what_is_hardly_seen_and_other_things():
 
 
 def test_on_frames_it_has_not_seen_it_tells_what_windows_show_and_corrects_their_boxes(
-    model, make_frame_with, make_backgrounds, tmp_path
+    model, make_frame_with, tmp_path
 ):
-    better = train_second_stage(model, make_backgrounds(60), CONFIG, sources=("walls",))
+    frames = [make_frame_with(seed, *2 * ("disc", "cross")) for seed in range(60)]
+    better = train_second_stage(model, backgrounds_of(*frames), CONFIG, sources=("walls",))
     assert better.about["second_stage"]["settings"]["sources"] == ["walls"]
     assert better.about["second_stage"]["frames"] == 60 and model.second_stage is None
     better.save(tmp_path / "m.npz")
