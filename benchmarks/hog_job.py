@@ -18,7 +18,7 @@ from thingmap.datasets.open_truth import open_truth
 from thingmap.datasets.synthetic.things.models import CLASSES
 from thingmap.datasets.truth import FrameTruth
 from thingmap.detectors.detections import Detections, Part
-from thingmap.detectors.hog.candidates import Candidates, ScoredLevel, corner_boxes
+from thingmap.detectors.hog.candidates import Candidates, corner_boxes, scored_levels
 from thingmap.detectors.hog.detector import HogDetector
 from thingmap.detectors.hog.model import HogModel, load_model
 from thingmap.detectors.hog.pyramid import build_pyramid
@@ -197,9 +197,7 @@ def scores_at(xyxy: np.ndarray, class_id: np.ndarray, frame: Frame, model: HogMo
     focal = float(np.sqrt(k.fx * k.fy))
     depth = frame.depth if model.channels.use_depth else None
     pyramid = build_pyramid(frame.color, depth, focal, model.channels, model.pyramid)
-    corners = corner_boxes(model.templates)
-    scored = Scorer(model.templates).scores(pyramid)
-    levels = [ScoredLevel.of(level, scores, corners) for level, scores in zip(pyramid.levels, scored, strict=True)]
+    levels = scored_levels(pyramid, Scorer(model.templates), corner_boxes(model.templates))
     result = np.zeros((len(xyxy), len(Part)))
     for part in Part:
         if not len(xyxy):

@@ -21,3 +21,8 @@ def box_ious(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     common = common_areas(a, b)
     union = areas(a)[:, None] + areas(b)[None] - common
     return np.divide(common, union, out=np.zeros_like(common), where=common > 0.0)
+
+
+def cut_to_image(boxes: np.ndarray, width: int, height: int) -> np.ndarray:
+    """(N, 4) pixels, without what lies outside of the image; NaN stays NaN."""
+    return np.clip(boxes, 0.0, np.array([width, height, width, height], dtype=np.float64))

@@ -10,10 +10,12 @@ import numpy as np
 from numba import njit
 from scipy.special import logit
 
+from ..boxes import areas, cut_to_image
 from ..detections import Part
 from .channels import CELL
-from .pyramid import Level
-from .scoring import part_boxes
+from .pyramid import Level, Pyramid
+from .scoring import Scorer, part_boxes
+from .suppression import suppress
 
 if TYPE_CHECKING:
     from .model import HogTemplate
@@ -103,6 +105,21 @@ def candidates(
     class_id = np.array([template.class_id for template in templates], dtype=np.int64)[t]
     part = np.array([template.part for template in templates], dtype=np.int8)[t]
     return Candidates(class_id, part, xyxy, probability).select(np.argsort(-probability, kind="stable"))
+
+
+def scored_levels(pyramid: Pyramid, scorer: Scorer, corner: np.ndarray) -> list[ScoredLevel]:
+    """The scores of all windows of a pyramid; `corner` are the `corner_boxes` of the scorer's templates."""
+    pairs = zip(pyramid.levels, scorer.scores(pyramid), strict=True)
+    return [ScoredLevel.of(level, scores, corner) for level, scores in pairs]
+
+
+def without_lesser(found: Candidates, width: int, height: int, nms_iou: float, most: int) -> Candidates:
+    """The windows that are left when those of the same class and part have suppressed each other, in the image of that
+    size; their boxes are not cut to it."""
+    boxes = cut_to_image(found.xyxy, width, height)
+    inside = np.flatnonzero(areas(boxes) > 0.0)
+    group = found.class_id * len(Part) + found.part
+    return found.select(inside[suppress(boxes[inside], group[inside], nms_iou, most)])
 
 
 def _score_of(probability: float, u: float, v: float) -> float:

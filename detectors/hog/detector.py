@@ -9,17 +9,18 @@ import numpy as np
 
 from ...datasets.errors import UserError
 from ...datasets.frame import Frame
+from ..boxes import cut_to_image
 from ..detections import Detections, Part
 from ..probability_maps import ProbabilityMaps
 from ..selection import check_selection
-from .candidates import Candidates, ScoredLevel, candidates, corner_boxes
+from .candidates import Candidates, ScoredLevel, candidates, corner_boxes, scored_levels, without_lesser
 from .maps import MapConfig, probability_maps
 from .model import HogModel, HogTemplate, load_model, shipped_model
 from .pyramid import build_pyramid
 from .refinement import ClassBoxes
 from .score_vectors import score_vectors
 from .scoring import Scorer
-from .second_stage.judged import JudgedWindows, cut_to_image, proposed_windows
+from .second_stage.judged import JudgedWindows, proposed_windows
 from .suppression import suppress
 
 SHIPPED = "hog"  # name of what is known of the shipped model
@@ -100,7 +101,7 @@ class HogDetector:
             UserError: for a frame without a depth image, if the model uses depth.
         """
         levels, judged = self._looked(frame)
-        return self._detections(self._of_each_class(levels, judged, frame), levels, judged, frame)
+        return self._detections(self._by_templates(levels, judged, frame), levels, judged, frame)
 
     def detect_dense(self, frame: Frame, /) -> tuple[Detections, ProbabilityMaps]:
         """The same detections, and the probability maps of the whole objects' templates.
@@ -109,8 +110,9 @@ class HogDetector:
             UserError: as a call.
         """
         levels, judged = self._looked(frame)
-        found = self._of_each_class(levels, judged, frame)
-        whole = found.select(found.part == Part.WHOLE)
+        found = self._by_templates(levels, judged, frame)
+        whole = self._of_each_class(found, judged)
+        whole = whole.select(whole.part == Part.WHOLE)
         boxes = ClassBoxes(whole.class_id, _clipped(whole.xyxy, frame), whole.probability)
         maps = probability_maps(
             levels, self._templates, self.classes, frame, boxes, self.maps, judged=judged is not None
@@ -132,21 +134,21 @@ class HogDetector:
             return [], None
         focal = float(np.sqrt(frame.intrinsics.fx * frame.intrinsics.fy))
         pyramid = build_pyramid(frame.color, depth, focal, model.channels, model.pyramid)
-        scores = self._scorer.scores(pyramid)
-        levels = [ScoredLevel.of(*item, self._corners) for item in zip(pyramid.levels, scores, strict=True)]
+        levels = scored_levels(pyramid, self._scorer, self._corners)
         if model.second_stage is None:
             return levels, None
         proposed = proposed_windows(levels, self._templates, pyramid.width, pyramid.height)
         return levels, JudgedWindows.of(model.second_stage, pyramid, frame.depth, focal, proposed)
 
-    def _of_each_class(self, levels: list[ScoredLevel], judged: JudgedWindows | None, frame: Frame) -> Candidates:
-        """The windows that are left when those of the same class and part have suppressed each other."""
+    def _by_templates(self, levels: list[ScoredLevel], judged: JudgedWindows | None, frame: Frame) -> Candidates:
+        """What templates find of each class and part for itself; of whole objects, only if there is no second stage."""
         parts = tuple(part for part in Part if judged is None or part != Part.WHOLE)
         found = candidates(levels, self._templates, self.confidence, parts)
-        boxes = _clipped(found.xyxy, frame)
-        found = found.select((boxes[:, 2] > boxes[:, 0]) & (boxes[:, 3] > boxes[:, 1]))
-        group = found.class_id * len(Part) + found.part
-        found = found.select(suppress(_clipped(found.xyxy, frame), group, self.nms_iou, self.max_detections))
+        height, width = frame.color.shape[:2]
+        return without_lesser(found, width, height, self.nms_iou, self.max_detections)
+
+    def _of_each_class(self, found: Candidates, judged: JudgedWindows | None) -> Candidates:
+        """What is found of each class and part for itself, by templates and by the second stage."""
         if judged is None:
             return found
         return judged.of_each_class(self.confidence, self.nms_iou, self.max_detections).joined(found)
@@ -154,13 +156,12 @@ class HogDetector:
     def _detections(
         self, found: Candidates, levels: list[ScoredLevel], judged: JudgedWindows | None, frame: Frame
     ) -> Detections:
-        """What is left of the windows of each class, with their scores."""
+        """What is left of what templates have found and the second stage has judged, with its scores."""
         if not self.merge:
+            found = self._of_each_class(found, judged)
             scores = np.full((len(found), len(self.classes)), np.nan)
             scores[np.arange(len(found)), found.class_id] = found.probability
             return _sorted(self.classes, _clipped(found.xyxy, frame), scores, found.part)
-        if judged is not None:
-            found = found.select(found.part != Part.WHOLE)
         found = found.select(suppress(_clipped(found.xyxy, frame), found.part, self.nms_iou, self.max_detections))
         boxes, part = _clipped(found.xyxy, frame), found.part
         scores = score_vectors(found, levels, self._templates, len(self.classes), self.nms_iou)

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...boxes import areas, cut_to_image
 from ...detections import Part
-from ..candidates import Candidates, ScoredLevel, candidates
+from ..candidates import Candidates, ScoredLevel, candidates, without_lesser
 from ..model import HogTemplate
 from ..pyramid import Pyramid
 from ..score_vectors import LEAST
@@ -53,7 +54,7 @@ class JudgedWindows:
         """Those of each class for itself, of at least a probability, that no better one of it suppresses."""
         n, class_id = np.nonzero(self.probability >= least)
         found = Candidates(class_id, np.full(len(n), Part.WHOLE, np.int8), self.xyxy[n], self.probability[n, class_id])
-        found = found.select(_has_area(found.xyxy))
+        found = found.select(areas(found.xyxy) > 0.0)
         found = found.select(np.argsort(-found.probability, kind="stable"))
         return found.select(suppress(found.xyxy, found.class_id, nms_iou, most))
 
@@ -62,7 +63,7 @@ class JudgedWindows:
         first: one box at a place, with the probabilities of all classes."""
         best = self.probability.max(axis=1, initial=0.0)
         order = np.argsort(-best, kind="stable")
-        order = order[(best[order] >= least) & _has_area(self.xyxy[order])]
+        order = order[(best[order] >= least) & (areas(self.xyxy[order]) > 0.0)]
         kept = order[suppress(self.xyxy[order], np.zeros(len(order), dtype=np.int64), nms_iou, most)]
         return JudgedWindows(self.xyxy[kept], self.probability[kept])
 
@@ -73,15 +74,5 @@ def proposed_windows(
     """The windows of an image that templates of whole objects propose, their boxes cut to it: of those of one class
     that overlap the most probable one."""
     found = candidates(levels, templates, PROPOSED, (Part.WHOLE,))
-    found = replace(found, xyxy=cut_to_image(found.xyxy, width, height))
-    found = found.select(_has_area(found.xyxy))
-    return found.select(suppress(found.xyxy, found.class_id, PROPOSED_IOU, MOST_PROPOSED))
-
-
-def cut_to_image(xyxy: np.ndarray, width: int, height: int) -> np.ndarray:
-    """(N, 4) boxes without what lies outside of the image."""
-    return np.clip(xyxy, 0.0, np.array([width, height, width, height], dtype=np.float64))
-
-
-def _has_area(xyxy: np.ndarray) -> np.ndarray:
-    return (xyxy[:, 2] > xyxy[:, 0]) & (xyxy[:, 3] > xyxy[:, 1])
+    found = without_lesser(found, width, height, PROPOSED_IOU, MOST_PROPOSED)
+    return replace(found, xyxy=cut_to_image(found.xyxy, width, height))

@@ -15,7 +15,7 @@ from ....datasets.object_views.backgrounds import Background, Backgrounds
 from ...boxes import box_ious
 from ...detections import Part
 from ...training.images import kept_frames
-from ..candidates import ScoredLevel, corner_boxes
+from ..candidates import corner_boxes, scored_levels
 from ..model import HogModel
 from ..pyramid import build_pyramid
 from ..scoring import Scorer
@@ -96,8 +96,7 @@ def window_samples(model: HogModel, frame: Background, config: SecondStageConfig
         raise UserError(f"{frame.name} has no depth, which a second stage needs; leave it out")
     templates = tuple(template for template in model.templates if template.part == Part.WHOLE)
     pyramid = build_pyramid(frame.color, frame.depth, frame.focal, model.channels, model.pyramid)
-    scores, corners = Scorer(templates).scores(pyramid), corner_boxes(templates)
-    levels = [ScoredLevel.of(*item, corners) for item in zip(pyramid.levels, scores, strict=True)]
+    levels = scored_levels(pyramid, Scorer(templates), corner_boxes(templates))
     proposed = proposed_windows(levels, templates, pyramid.width, pyramid.height)
     views = window_views(pyramid, frame.depth, frame.focal, proposed, len(model.classes))
     label, offsets = what_they_show(proposed.xyxy, frame, model.classes, config)
