@@ -9,17 +9,15 @@ than they should be.
 
 from __future__ import annotations
 
-import argparse
 import sys
-import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numba
+from learning_script import run_script
 from suite import Scene
 from suite_job import is_rendered, render, scene_folder
 
-from thingmap.datasets.errors import UserError
 from thingmap.datasets.synthetic.config import ClutterLevel, Preset
 from thingmap.detectors.detector import Detector
 from thingmap.detectors.spec import make_detector
@@ -36,24 +34,7 @@ NAME = "HOG templates of the synthetic world"
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Render, learn, write; 2 for a user's mistake."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--folder", type=Path, metavar="DIR", help="keep scenes there; scenes in it are used again")
-    parser.add_argument("--quick", action="store_true", help="three short tables, to see whether everything works")
-    group = parser.add_mutually_exclusive_group(required=True)
-    group.add_argument("--write", action="store_true", help="replace the model that is shipped")
-    group.add_argument("-o", "--output", type=Path, metavar="FILE", help="write it there")
-    options = parser.parse_args(arguments)
-    if options.write and options.quick:
-        parser.error("--write is for all scenes")
-    with tempfile.TemporaryDirectory() as temporary:
-        try:
-            learn_hog(
-                options.folder or Path(temporary), SHIPPED_HOG if options.write else options.output, options.quick
-            )
-        except UserError as error:
-            print(f"error: {error}", file=sys.stderr)
-            return 2
-    return 0
+    return run_script(arguments, __doc__, SHIPPED_HOG, learn_hog)
 
 
 def learn_hog(folder: Path, output: Path, quick: bool = False) -> None:

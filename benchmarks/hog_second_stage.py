@@ -8,16 +8,14 @@ The scenes are rendered ones of seeds that neither a benchmark nor the training 
 
 from __future__ import annotations
 
-import argparse
 import sys
-import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from hog_model import rendered, scene_name
+from learning_script import run_script
 from timing import StageLines
 
-from thingmap.datasets.errors import UserError
 from thingmap.datasets.object_views.backgrounds import Backgrounds
 from thingmap.datasets.open import open_sequence
 from thingmap.datasets.synthetic.config import ClutterLevel, Preset, SyntheticConfig
@@ -37,22 +35,7 @@ QUICK_CONFIG = SecondStageConfig(fit=FitConfig(hidden=(8,), dropout=(0.0, 0.0), 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Render, learn, write; 2 for a user's mistake."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--folder", type=Path, metavar="DIR", help="keep scenes there; scenes in it are used again")
-    parser.add_argument("--quick", action="store_true", help="few frames, to see whether everything works")
-    group = parser.add_mutually_exclusive_group(required=True)
-    group.add_argument("--write", action="store_true", help="replace that of the model that is shipped")
-    group.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the model there")
-    options = parser.parse_args(arguments)
-    if options.write and options.quick:
-        parser.error("--write is for all scenes")
-    with tempfile.TemporaryDirectory() as temporary:
-        try:
-            learn(options.folder or Path(temporary), options.output or shipped_model(), options.quick)
-        except UserError as error:
-            print(f"error: {error}", file=sys.stderr)
-            return 2
-    return 0
+    return run_script(arguments, __doc__, shipped_model(), learn)
 
 
 def learn(folder: Path, output: Path, quick: bool = False) -> None:
