@@ -30,9 +30,9 @@ class MrfConfig:
         looks: for how many looks at a voxel its data term stands; all lambdas are divided by it. Equation (7) is a
             mean, so that all points in many frames count as one look. Then a can or a mug has 300 to 600 nats in favour
             of it, and its border, 110 to 180 pairs of voxels, costs 2600 to 4200 with lambda = 100: objects become
-            background, 0.23 / 0.54. On twelve tables (seeds 41 to 44) 0.952 / 0.960 with
-            33 looks, 0.950 / 0.953 with 50, 0.946 / 0.949 with 75, 0.941 / 0.947 with 100; with 25 0.952 alone. Colours
-            have 0.949 / 0.953 with 33, 0.946 / 0.947 with 50.
+            background, 0.23 / 0.54. On twelve tables (seeds 41 to 44) 0.952 / 0.960 with 33 looks, 0.950 / 0.953 with
+            50, 0.946 / 0.949 with 75, 0.941 / 0.947 with 100; with 25 0.952 alone. Colours have 0.949 / 0.953 with 33,
+            0.946 / 0.947 with 50.
         normals_strength: lambda of equation (10), nats for as many looks.
         concave_share: epsilon of equation (10): what a concave or flat pair costs, of what a convex one does.
         normals_offset: the small constant in d(n_i, n_j) of equation (10), which the paper does not state: what normals
@@ -46,9 +46,8 @@ class MrfConfig:
         normals_step: in voxels, how far two of them may lie apart along their normals and be of one surface; infinity
             for the paper's equation, which has no such limit. On twelve tables (seeds 41 to 44), 50 looks, the classes
             of objects alone: 0.943 / 0.948 by the paper's equation, 0.950 / 0.953 with both numbers here, 0.945 / 0.949
-            with this alone; recall of bowls 0.91 / 0.95 and 0.95 / 0.99. Colours have 0.946 / 0.947. From 0.7 to 0.9
-            with `concave_from` from 0.2 to 0.4 it is 0.947 to 0.953 / 0.952 to 0.953; with 33 looks 0.952 / 0.960, with
-            75 0.946 / 0.949, with 100 0.941 / 0.947.
+            with this alone; recall of bowls 0.91 / 0.95 and 0.95 / 0.99. From 0.7 to 0.9 with `concave_from` from 0.2
+            to 0.4 it is 0.947 to 0.953 / 0.952 to 0.953.
         concave_from: from which difference of unit normals on, 0 to 2, a concave pair costs less than a flat one; 0 for
             the paper's equation. Alone 0.947 / 0.953. In a bowl of 8 cm radius neighbours' normals differ by 0.12 to
             0.22, across a right-angled crease by 1.41.
