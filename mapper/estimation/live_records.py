@@ -29,6 +29,7 @@ class LiveRecords:
         self._retired: dict[int, list[int]] = {}  # the same of those that are out of the graph
         self._merged_into: dict[int, int] = {}
         self._links: dict[int, Link] = {}
+        self._loops: dict[int, Loop] = {}  # those of them that close loops
         self._dropped: set[int] = set()
 
     def add(self, number: int, record: Record) -> None:
@@ -40,9 +41,12 @@ class LiveRecords:
                 self._of_landmark[self.owner(record.landmark)].append(number)
             case Motion() | Visual() | ScanMatch() | Loop():
                 self._links[number] = record
+                if isinstance(record, Loop):
+                    self._loops[number] = record
             case DropLoop():
                 self._dropped.add(record.record)
                 self._links.pop(record.record, None)
+                self._loops.pop(record.record, None)
             case DropMeasurement():
                 self._dropped.add(record.record)
                 for numbers in (*self._of_landmark.values(), *self._retired.values()):
@@ -76,7 +80,7 @@ class LiveRecords:
 
     def loops(self) -> dict[int, Loop]:
         """Loop closures in the graph by their numbers."""
-        return {number: link for number, link in self._links.items() if isinstance(link, Loop)}
+        return dict(self._loops)
 
     def links(self) -> list[Link]:
         """All measured motions between keyframes."""

@@ -112,3 +112,5 @@ def test_without_the_joint_graph_a_ledger_still_makes_the_graph_again(tools):
     again = Smoother.from_ledger(room.smoother.ledger, replace(tools.exact, joint=False), tools.kinect)
     np.testing.assert_allclose(again.position(1), room.smoother.position(1), atol=0.01)
     np.testing.assert_allclose(again.poses(), room.smoother.poses(), atol=1e-6)
+    for t, T in enumerate(room.smoother.poses()):  # beside the fixed copies, which are poses as well
+        np.testing.assert_allclose(T, room.smoother.pose(t), atol=1e-12)
