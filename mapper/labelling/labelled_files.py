@@ -53,8 +53,8 @@ def write_labelling(
     label = labels.label
     colors = labelled_colors(voxels.colours, label, object_map.classes)
     ids = [thing.id for thing in object_map.things]
-    number = None if instances is None else instances.number
-    write_labels(folder.labels_file, voxels.points, colors, labels.of_points(), object_map.classes, number, ids)
+    own = labels.of_points(None if instances is None else instances.number)
+    write_labels(folder.labels_file, voxels.points, colors, own, object_map.classes, ids)
     points = {name: int(np.sum(label == k)) for k, name in enumerate(object_map.classes)}
     points = {name: count for name, count in points.items() if count} | {BACKGROUND: int(np.sum(label == NO_OBJECT))}
     _add_counts(folder, object_map, points, instances)

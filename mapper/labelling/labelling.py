@@ -40,9 +40,9 @@ class Labels:
     gap: float | None
     settled: bool
 
-    def of_points(self) -> PointLabels:
-        """What labels.ply says of the voxels, a point each."""
-        return PointLabels(self.label, self.second, self.margin)
+    def of_points(self, instance: np.ndarray | None = None) -> PointLabels:
+        """What labels.ply says of the voxels, a point each; with (N,) numbers of their things where these are known."""
+        return PointLabels(self.label, self.second, self.margin, instance)
 
 
 def label_voxels(voxels: Voxels, config: MrfConfig, more: np.ndarray | None = None) -> Labels:

@@ -27,19 +27,22 @@ class PointLabels:
         second: (M,) the same: what a point's own evidence says next to its label, or rather than that.
         margin: (M,) float32 nats of one look, by which a point's own evidence is for `label` and not for `second`;
             below 0 where its neighbours have decided. Both are None where nobody knows.
+        instance: (M,) number of each point's thing, 0 for none; None where nobody knows.
 
     Raises:
-        ValueError: only one of the last two is there, or they are of different lengths.
+        ValueError: only one of second and margin is there, or the arrays are of different lengths.
     """
 
     label: np.ndarray
     second: np.ndarray | None = None
     margin: np.ndarray | None = None
+    instance: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        lengths = {len(array) for array in (self.label, self.second, self.margin) if array is not None}
+        arrays = self.label, self.second, self.margin, self.instance
+        lengths = {len(array) for array in arrays if array is not None}
         if (self.second is None) != (self.margin is None) or len(lengths) > 1:
-            raise ValueError("label, and either second and margin or neither, must be of equal lengths")
+            raise ValueError("label, instance, and either second and margin or neither, must be of equal lengths")
 
 
 def write_labels(
@@ -48,7 +51,6 @@ def write_labels(
     colors: np.ndarray,
     labels: PointLabels,
     classes: Sequence[str],
-    instance: np.ndarray | None = None,
     things: Sequence[str] = (),
 ) -> None:
     """A cloud with a class for every point, and the thing that it belongs to where that is known.
@@ -58,15 +60,13 @@ def write_labels(
         points: (M, 3) metres, map frame.
         colors: (M, 3) uint8 RGB.
         labels: of the points. In the file labels and seconds are 0 for none and k + 1 for class k, which a comment line
-            names: `comment label 3 "cup"`.
+            names: `comment label 3 "cup"`. What nobody knows, the file has no property for.
         classes: of the map.
-        instance: (M,) number of each point's thing, t + 1 for `things[t]` (`comment instance 1 "thing-0007"`) and 0 for
-            none; None where nobody knows: the file has no such property then.
-        things: their ids.
+        things: ids of those that instances are numbers of, from 1 on (`comment instance 1 "thing-0007"`).
     """
     values, comments = {"label": _numbers(labels.label)}, _numbered("label", classes)
-    if instance is not None:
-        values["instance"] = instance
+    if labels.instance is not None:
+        values["instance"] = labels.instance
         comments += _numbered("instance", things)
     if labels.second is not None and labels.margin is not None:
         values |= {"second": _numbers(labels.second), "margin": labels.margin}
@@ -102,10 +102,11 @@ def read_labels(file: Path, classes: Sequence[str]) -> tuple[np.ndarray, PointLa
         raise InputError(file, "an integer `label` for every vertex", found, "add it, or remove the file")
     named = _named_labels(file, [*content.comments, *content["vertex"].comments], classes)
     label = _labels_of(file, vertices, field, named, classes)
+    instance = vertices["instance"].astype(np.int64) if "instance" in fields else None
     if not {"second", "margin"} <= set(fields):
-        return points, PointLabels(label)
+        return points, PointLabels(label, instance=instance)
     second = _labels_of(file, vertices, "second", named, classes)
-    return points, PointLabels(label, second, vertices["margin"].astype(np.float32))
+    return points, PointLabels(label, second, vertices["margin"].astype(np.float32), instance)
 
 
 def read_instances(file: Path) -> dict[str, np.ndarray]:

@@ -59,7 +59,8 @@ def out(bare) -> Path:
     """The same, labelled: the second thing has two points, the first one, the third none."""
     ids = [thing.id for thing in ObjectMap.load(bare).things]
     colors = np.zeros((5, 3), np.uint8)
-    write_labels(OutputFolder(bare).labels_file, POINTS, colors, PointLabels(LABELS), ("cup", "bowl"), NUMBERS, ids)
+    labels = PointLabels(LABELS, instance=NUMBERS)
+    write_labels(OutputFolder(bare).labels_file, POINTS, colors, labels, ("cup", "bowl"), ids)
     change(bare, labels={"file": "labels.ply", "points": COUNTS})
     change_things(bare, lambda n, thing: thing | {"points": [1, 2, 0][n]})
     return bare
@@ -132,9 +133,8 @@ def test_the_cloud_of_another_map_is_refused(out):
         OutputFolder(out).labels_file,
         POINTS,
         np.zeros((5, 3), np.uint8),
-        PointLabels(LABELS),
+        PointLabels(LABELS, instance=NUMBERS),
         ("cup",),
-        NUMBERS,
         ["thing-0007", "x"],
     )
     with pytest.raises(InputError, match=r"labels\.ply.*2 points for thing-0007.*found 1"):
