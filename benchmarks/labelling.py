@@ -74,7 +74,8 @@ def describe(name: str, judged: Sequence[JudgedScene]) -> str:
             "With the map's volumes as evidence:",
             category_table(judged, volumes=True),
             clutter_table(judged),
-            "Boxes of frames that no label comes from, before and after those were pruned that labels deny:",
+            "Boxes of frames that no label comes from: as the detector gives them -> those that labels agree with -> "
+            "each thing once, its box drawn midway to its points:",
             box_table(judged),
         ]
     )

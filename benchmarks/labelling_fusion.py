@@ -29,7 +29,8 @@ from thingmap.mapper.labelling.labelling import label_voxels
 from thingmap.mapper.labelling.labelling_config import LabellingConfig
 from thingmap.mapper.labelling.sources import evidence_of
 from thingmap.mapper.labelling.surface import surface_of
-from thingmap.mapper.labelling.validation import ValidationConfig, visible_points
+from thingmap.mapper.labelling.validation import project_points
+from thingmap.mapper.labelling.validation_config import ValidationConfig
 from thingmap.mapper.labelling.voxels import VoxelEvidence, Voxels
 
 TITLE = "Labelled points of recorded views"
@@ -89,9 +90,10 @@ def judge(views: Sequence[LabelledView], config: LabellingConfig, grown: int, mi
     for number, view in enumerate(views):
         if number % EVERY:
             assert view.frame.T_world_camera is not None
-            seen = visible_points(voxels.points, view.frame, view.frame.T_world_camera, ValidationConfig().tolerance)
-            column, row = np.floor(seen[0] + 0.5).astype(np.intp).T
-            found.append(label[seen[1]])
+            pose, tolerance = view.frame.T_world_camera, ValidationConfig().tolerance
+            rows, uv, is_seen = project_points(voxels.points, view.frame, pose, tolerance)
+            column, row = np.floor(uv[is_seen] + 0.5).astype(np.intp).T
+            found.append(label[rows[is_seen]])
             true.append(view.instances[row, column])
     return score_labels(np.concatenate(found), np.concatenate(true), classes)
 

@@ -23,10 +23,11 @@ from thingmap.mapper.evaluation.inputs.build_case import build_case
 from thingmap.mapper.evaluation.inputs.case import Case, MappedRun
 from thingmap.mapper.evaluation.inputs.load_run import load_run
 from thingmap.mapper.evaluation.points.labelled_points import label_points
+from thingmap.mapper.labelling.instances import find_instances
 from thingmap.mapper.labelling.labelling import Labels, label_voxels
 from thingmap.mapper.labelling.labelling_config import LabellingConfig
 from thingmap.mapper.labelling.mrf_config import Smoothness
-from thingmap.mapper.labelling.validation import ValidationConfig, Validator
+from thingmap.mapper.labelling.validation import Validator
 from thingmap.mapper.labelling.volumes_evidence import weighted_volumes
 from thingmap.mapper.labelling.voxels import Voxels
 
@@ -67,13 +68,15 @@ class JudgedScene:
         classes: of the truth.
         points: of every variant.
         before: boxes of the frames between, as the detector gives them.
-        after: those of them that the labels of `CHECKED` agree with.
+        agreed: those of them that the labels of `CHECKED` agree with (Lai et al., IV-C).
+        after: the same where things are found once and drawn midway to their points, as `--validate` does.
     """
 
     job: Job
     classes: tuple[str, ...]
     points: Mapping[Variant, Points]
     before: Scored
+    agreed: Scored
     after: Scored
 
 
@@ -94,13 +97,13 @@ def judge_scene(job: Job) -> JudgedScene:
                 labels = label_by(variant, voxels, run, config)
                 points[variant] = judge_points(voxels, labels.label, run, job)
                 if variant == CHECKED:
-                    checked = voxels.points, labels.of_points()
+                    own = find_instances(voxels, labels, run.object_map, config).number
+                    checked = voxels.points, labels.of_points(own)
     assert checked is not None
     order = np.argsort(run.stamps, kind="stable")
     poses = run.stamps[order], run.poses[order]
-    validator = Validator(*checked, run.object_map.classes, *poses, ValidationConfig())
-    before, after = check_detections(job, build_case(run, truth), sequence, validator)
-    return JudgedScene(job, truth.classes, points, before, after)
+    validator = Validator(*checked, run.object_map.classes, *poses)
+    return JudgedScene(job, truth.classes, points, *check_detections(job, build_case(run, truth), sequence, validator))
 
 
 def label_by(variant: Variant, voxels: Voxels, run: MappedRun, config: LabellingConfig) -> Labels:
@@ -116,23 +119,25 @@ def judge_points(voxels: Voxels, label: np.ndarray, run: MappedRun, job: Job) ->
     return Points(points.found.astype(np.int8), points.true.astype(np.int8))
 
 
-def check_detections(job: Job, case: Case, sequence: Sequence, validator: Validator) -> tuple[Scored, Scored]:
-    """Boxes of the frames between, all classes together, before and after validation."""
+def check_detections(job: Job, case: Case, sequence: Sequence, validator: Validator) -> tuple[Scored, Scored, Scored]:
+    """Boxes of the frames between, all classes together: before, those that labels agree with, and validated."""
     check_boxes(case.truth)
     assert case.truth.intrinsics is not None
     detector = make_detector(_with_low_threshold(job.detector), sequence)
-    before, after = [], []
+    before, agreed, after = [], [], []
     for index, row in zip(case.truth_index.tolist(), case.run_index.tolist(), strict=True):
         true = frame_boxes(case, index) if index % MANY == BETWEEN else None
         if true is None:
             continue
         frame = sequence[index]
         found = detector(frame)
-        stay = validator.validate(found, frame, case.run.poses[row])
-        for matches, some in ((before, found), (after, found.select(stay))):
+        pose = case.run.poses[row]
+        agreeing = found.select(validator.agrees(found, frame, pose))
+        validated = validator.validate(found, frame, pose).detections
+        for matches, some in ((before, found), (agreed, agreeing), (after, validated)):
             boxes = detected_boxes(some, case, case.truth.intrinsics)
             matches.append(match_boxes(boxes, true, case.config.box_iou, index))
-    return scored(before), scored(after)
+    return scored(before), scored(agreed), scored(after)
 
 
 def _with_low_threshold(spec: str) -> str:

@@ -84,18 +84,18 @@ def clutter_table(judged: Sequence[JudgedScene]) -> str:
 
 
 def box_table(judged: Sequence[JudgedScene]) -> str:
-    """Figure 8: boxes of each scene before and after those were pruned that labels deny."""
-    both: list[tuple[str, Scored, Scored]] = [(scene.job.scene.name, scene.before, scene.after) for scene in judged]
-    both.append(("**all**", *(Scored.pooled(getattr(s, name) for s in judged) for name in ("before", "after"))))
+    """Figure 8: boxes of each scene as they are, those that labels agree with, and validated."""
+    stages = "before", "agreed", "after"
+    boxes: list[tuple[str, list[Scored]]] = [(s.job.scene.name, [getattr(s, name) for name in stages]) for s in judged]
+    boxes.append(("**all**", [Scored.pooled(getattr(s, name) for s in judged) for name in stages]))
     measures: tuple[tuple[str, Callable[[Scored], float | None]], ...] = (
         ("average precision", average_precision),
         (f"precision at {RECALL:.0%} recall", precision_at),
         ("most recall", most_recall),
     )
     lines = []
-    for name, before, after in both:
-        pairs = [(measure(before), measure(after)) for _, measure in measures]
-        lines.append((name, *(f"{_number(a)} -> {_number(b)}" for a, b in pairs)))
+    for name, several in boxes:
+        lines.append((name, *(" -> ".join(_number(measure(one)) for one in several) for _, measure in measures)))
     return table(("boxes", *(name for name, _ in measures)), lines)
 
 

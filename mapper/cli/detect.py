@@ -31,7 +31,7 @@ def detect(
     max_frames: MaxFramesOption = None,
     validate: Annotated[
         Path | None,
-        typer.Option(metavar="OUT", help="Leave out boxes that disagree with the points of a labelled run."),
+        typer.Option(metavar="OUT", help="Hold boxes against the points of a labelled run."),
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace FILE if it is there.")] = False,
 ) -> None:
@@ -40,7 +40,8 @@ def detect(
     `thingmap run --detector recorded:FILE` maps from the file.
 
     With --validate OUT, the folder of a run of this sequence that `thingmap label` has labelled, a box stays only where
-    its class is that of most points in the middle of it. Give the detector a low threshold then.
+    its class is that of most points in the middle of it; of several on one thing the best stays, and is drawn midway to
+    where that thing's points reach. Give the detector a low threshold then.
 
     Ctrl-C ends after the frame at hand and writes the frames so far.
     """
@@ -73,7 +74,8 @@ def detect(
     if written:
         typer.echo(f"{job.boxes} boxes in {written} frames; they are in {output}")
         if validate is not None:
-            typer.echo(f"{job.pruned} more disagreed with {validate} and were left out")
+            why = f"{job.denied} disagreed with {validate}, {job.doubled} were not the best of a thing"
+            typer.echo(f"{job.denied + job.doubled} more were left out: {why}")
         if job.unmapped:
             typer.echo(f"{job.unmapped} frames are not in {validate}: their boxes are as they were found", err=True)
     if job.stopped:
@@ -97,7 +99,7 @@ class _Detecting:
         self._progress, self._should_stop = progress, should_stop
         self.skipped: dict[str, list[str]] = defaultdict(list)
         self.boxes = 0
-        self.pruned = 0
+        self.denied = self.doubled = 0
         self.unmapped = 0
         self.stopped = False
 
@@ -125,6 +127,7 @@ class _Detecting:
         if T_world_camera is None:
             self.unmapped += 1
             return detections
-        stay = self._validator.validate(detections, frame, T_world_camera)
-        self.pruned += int((~stay).sum())
-        return detections.select(stay)
+        validated = self._validator.validate(detections, frame, T_world_camera)
+        self.denied += validated.denied
+        self.doubled += validated.doubled
+        return validated.detections

@@ -38,7 +38,7 @@ def made_up(accuracy: dict[Variant, float], before: Scored, after: Scored) -> Ju
     for variant in labelling_job.VARIANTS:
         wrong = np.arange(len(true)) % 250 >= 250 * accuracy.get(variant, 0.5)
         points[variant] = Points(np.where(wrong & (true != NO_OBJECT), NO_OBJECT, true).astype(np.int8), true)
-    return JudgedScene(Job(SCENE, Path(), "none"), CLASSES, points, before, after)
+    return JudgedScene(Job(SCENE, Path(), "none"), CLASSES, points, before, AGREED, after)
 
 
 def boxes(*right: bool, objects: int = 5) -> Scored:
@@ -47,6 +47,7 @@ def boxes(*right: bool, objects: int = 5) -> Scored:
 
 
 BEFORE, AFTER = boxes(True, False, True, False, True), boxes(True, True, True)
+AGREED = boxes(True, False, True, True)
 
 
 def test_precision_at_a_recall_and_the_most_recall():
@@ -78,7 +79,7 @@ def test_tables_say_what_was_labelled_right():
     by_category = {row[1]: row for row in cells(category_table(judged, volumes=True))}
     assert by_category["Det3DMRF"][2:4] == ["100.0 / 80.0"] * 2
     assert "0.889" in clutter_table(judged) and "low" in clutter_table(judged)
-    assert "0.600 -> 1.000" in box_table(judged)
+    assert "0.600 -> 0.750 -> 1.000" in box_table(judged)
 
 
 def test_a_tiny_scene_is_judged_and_found_again(tmp_path, monkeypatch):
@@ -95,7 +96,8 @@ def test_a_tiny_scene_is_judged_and_found_again(tmp_path, monkeypatch):
     assert set(judged.points) == set(variants)
     share = {v: np.mean((p.found == p.true)[p.true != NO_OBJECT]) for v, p in judged.points.items()}
     assert share[variants[0]] > 0.5 and share[variants[2]] < share[variants[0]]
-    assert judged.before.images == 4 and len(judged.after.scores) <= len(judged.before.scores)
+    assert judged.before.images == 4 and 0 < len(judged.after.scores) <= len(judged.agreed.scores)
+    assert len(judged.agreed.scores) <= len(judged.before.scores)
     times = {file: file.stat().st_mtime_ns for file in (job.out / "map.json", job.out / "voxels-4.npz")}
     again = judge_scene(replace(job, reuse=True))
     assert {file: file.stat().st_mtime_ns for file in times} == times

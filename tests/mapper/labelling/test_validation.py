@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,8 +12,10 @@ from hypothesis import strategies as st
 from thingmap.datasets.errors import UserError
 from thingmap.datasets.frame import Frame, Intrinsics
 from thingmap.datasets.truth import NO_OBJECT
-from thingmap.detectors.detections import Detections
-from thingmap.mapper.labelling.validation import ValidationConfig, Validator, central_votes, visible_points
+from thingmap.detectors.detections import Detections, Part
+from thingmap.mapper.labelling.box_votes import central_votes
+from thingmap.mapper.labelling.validation import Validator, project_points
+from thingmap.mapper.labelling.validation_config import ValidationConfig
 from thingmap.mapper.map.labels_file import PointLabels
 
 CUP, BOWL = 0, 1
@@ -54,14 +58,14 @@ def boxes(*claims, classes=("cup", "bowl")) -> Detections:
 def test_boxes_stay_where_the_points_in_the_middle_agree():
     validator = make_validator(*make_points())
     found = boxes((ON_CUP, CUP), (ON_CUP, BOWL), (ON_WALL, CUP), (ON_WALL, BOWL))
-    assert validator.validate(found, make_frame(), np.eye(4)).tolist() == [True, False, False, False]
+    assert validator.agrees(found, make_frame(), np.eye(4)).tolist() == [True, False, False, False]
 
 
 def test_classes_are_told_by_name_and_not_by_number():
     found = boxes((ON_CUP, 1), (ON_CUP, 0), classes=("bowl", "cup"))
-    assert make_validator(*make_points()).validate(found, make_frame(), np.eye(4)).tolist() == [True, False]
+    assert make_validator(*make_points()).agrees(found, make_frame(), np.eye(4)).tolist() == [True, False]
     with pytest.raises(UserError, match="sofa"):
-        make_validator(*make_points()).validate(boxes((ON_CUP, 0), classes=("sofa",)), make_frame(), np.eye(4))
+        make_validator(*make_points()).agrees(boxes((ON_CUP, 0), classes=("sofa",)), make_frame(), np.eye(4))
 
 
 def test_a_box_stays_that_unsure_points_may_be_of():
@@ -74,17 +78,17 @@ def test_a_box_stays_that_unsure_points_may_be_of():
     for near, stays in ((0.5, [True, False, False]), (0.7, [False, False, False])):
         margin = np.where(on_cup & top, near, 1.2).astype(np.float32)
         validator = make_validator(points, background, second, margin, doubt=0.6, central=1.0)
-        assert validator.validate(found, frame, np.eye(4)).tolist() == stays
+        assert validator.agrees(found, frame, np.eye(4)).tolist() == stays
     by_labels_alone = make_validator(points, background, second, margin - 1.0, doubt=0.0, central=1.0)
-    assert not make_validator(points, background).validate(found, frame, np.eye(4)).any()
-    assert by_labels_alone.validate(found, frame, np.eye(4)).tolist() == [True, False, False]  # the evidence is a cup's
+    assert not make_validator(points, background).agrees(found, frame, np.eye(4)).any()
+    assert by_labels_alone.agrees(found, frame, np.eye(4)).tolist() == [True, False, False]  # the evidence is a cup's
 
 
 def test_only_the_middle_counts():
     wide = (12.0, 4.0, 52.0, 44.0)  # 40 x 40 pixels around the cup's 16 x 16
     frame, found = make_frame(), boxes((wide, CUP))
-    assert make_validator(*make_points(), central=0.4).validate(found, frame, np.eye(4)).all()
-    assert not make_validator(*make_points(), central=0.9).validate(found, frame, np.eye(4)).any()
+    assert make_validator(*make_points(), central=0.4).agrees(found, frame, np.eye(4)).all()
+    assert not make_validator(*make_points(), central=0.9).agrees(found, frame, np.eye(4)).any()
 
 
 def test_a_box_stays_whose_middle_is_hidden():
@@ -96,17 +100,17 @@ def test_a_box_stays_whose_middle_is_hidden():
     found = boxes((around, BOWL))
     for share, stays in ((0.1, True), (0.3, False)):
         validator = make_validator(points, labels, share=share)
-        assert validator.validate(found, frame, np.eye(4)).tolist() == [stays]
+        assert validator.agrees(found, frame, np.eye(4)).tolist() == [stays]
 
 
 def test_what_no_points_speak_of_stays():
     points, labels = make_points()
     nothing = make_validator(points[:0], labels[:0])
-    assert nothing.validate(boxes((ON_CUP, BOWL)), make_frame(), np.eye(4)).all()
+    assert nothing.agrees(boxes((ON_CUP, BOWL)), make_frame(), np.eye(4)).all()
     dark = make_frame()
     dark.depth[:] = 0.0
-    assert make_validator(points, labels).validate(boxes((ON_CUP, BOWL)), dark, np.eye(4)).all()
-    assert make_validator(points, labels).validate(Detections.empty(("cup",)), make_frame(), np.eye(4)).shape == (0,)
+    assert make_validator(points, labels).agrees(boxes((ON_CUP, BOWL)), dark, np.eye(4)).all()
+    assert make_validator(points, labels).agrees(Detections.empty(("cup",)), make_frame(), np.eye(4)).shape == (0,)
 
 
 def test_a_moved_camera_sees_the_same():
@@ -117,22 +121,22 @@ def test_a_moved_camera_sees_the_same():
     points, labels = make_points()
     validator = make_validator(points @ turn.T + T_world_camera[:3, 3], labels)
     found = boxes((ON_CUP, CUP), (ON_CUP, BOWL), (ON_WALL, CUP))
-    assert validator.validate(found, make_frame(), T_world_camera).tolist() == [True, False, False]
+    assert validator.agrees(found, make_frame(), T_world_camera).tolist() == [True, False, False]
 
 
 def test_only_what_the_depth_shows_is_visible():
     frame = make_frame()
     points = np.array([[0, 0, 1.0], [0, 0, 1.03], [0, 0, 1.05], [0, 0, 0.95], [0, 0, -1.0], [0.5, 0, 2.0], [1.1, 0, 2]])
-    uv, rows = visible_points(points, frame, np.eye(4), 0.04)
-    assert rows.tolist() == [0, 1, 5]
-    assert uv[0] == pytest.approx([31.5, 23.5]) and uv[2] == pytest.approx([46.5, 23.5])
+    rows, uv, is_seen = project_points(points, frame, np.eye(4), 0.04)
+    assert rows.tolist() == [0, 1, 2, 3, 5, 6] and rows[is_seen].tolist() == [0, 1, 5]  # one is behind the camera
+    assert uv[0] == pytest.approx([31.5, 23.5]) and uv[4] == pytest.approx([46.5, 23.5])
 
 
 def test_the_edges_of_the_image():
     frame = make_frame()
     uv = np.array([[-0.5, 0.0], [-0.51, 0.0], [63.49, 47.49], [63.5, 47.0], [0.0, 47.51]])
     points = INTRINSICS.back_project(uv, np.full(len(uv), 2.0))
-    assert visible_points(points, frame, np.eye(4), 0.04)[1].tolist() == [0, 2]
+    assert np.flatnonzero(project_points(points, frame, np.eye(4), 0.04)[2]).tolist() == [0, 2]
 
 
 @settings(max_examples=30, deadline=None)
@@ -159,5 +163,62 @@ def test_poses_are_those_of_mapped_frames():
 
 @pytest.mark.parametrize("wrong", [{"central": 0.0}, {"central": 1.1}, {"tolerance": 0.0}, {"least_points": 0}])
 def test_numbers_out_of_range_are_refused(wrong):
+    with pytest.raises(UserError):
+        ValidationConfig(**wrong)
+
+
+# -- where it is known whose the points are
+
+
+def with_things(points, labels, number, **config) -> Validator:
+    known = PointLabels(labels, instance=number)
+    return Validator(points, known, CLASSES, np.array([0.5]), np.eye(4)[None], ValidationConfig(**config))
+
+
+def test_a_thing_is_found_once_and_drawn_midway_to_its_points():
+    points, labels = make_points()
+    validator = with_things(points, labels, np.where(labels == CUP, 5, 0))
+    aside, double, wrong = (22.0, 16.0, 38.0, 32.0), (26.0, 18.0, 42.0, 34.0), (24.0, 16.0, 40.0, 32.0)
+    found = boxes((aside, CUP), (double, CUP), (wrong, BOWL), (ON_WALL, CUP))
+    found.scores[:2] = [[0.9, np.nan], [0.8, np.nan]]
+    validated = validator.validate(found, make_frame(), np.eye(4))
+    assert (validated.denied, validated.doubled) == (2, 1)
+    # a point in every second pixel, the first in the middle of 24, the last in that of 38
+    np.testing.assert_allclose(validated.detections.xyxy, [(23.25, 16.25, 38.25, 31.25)])
+    assert validated.detections.confidence.tolist() == [0.9]
+
+
+def test_without_things_labels_alone_decide():
+    found = boxes((ON_CUP, CUP), ((26.0, 18.0, 42.0, 34.0), CUP), (ON_CUP, BOWL))
+    validated = make_validator(*make_points()).validate(found, make_frame(), np.eye(4))
+    assert (validated.denied, validated.doubled) == (1, 0)
+    np.testing.assert_array_equal(validated.detections.xyxy, found.xyxy[:2])
+
+
+def test_boxes_of_masks_and_of_parts_stay_where_they_are():
+    points, labels = make_points()
+    validator = with_things(points, labels, np.where(labels == CUP, 5, 0))
+    found = boxes(((22.0, 16.0, 38.0, 32.0), CUP), ((22.0, 16.0, 30.0, 32.0), CUP))
+    masked = replace(found, mask=np.zeros((2, 48, 64), bool))
+    halves = replace(found, part=np.array([Part.LEFT, Part.LEFT]))
+    for some in (masked, halves):
+        kept = validator.validate(some, make_frame(), np.eye(4)).detections
+        np.testing.assert_array_equal(kept.xyxy, some.xyxy[: len(kept)])
+    assert len(validator.validate(halves, make_frame(), np.eye(4)).detections) == 2  # parts are no doubles
+
+
+def test_what_is_half_outside_of_the_image_is_drawn_to_its_edge():
+    """A cup that reaches from the image's left edge to 10 px beyond it: its points are before the camera, unseen."""
+    frame = make_frame()
+    frame.depth[10:30, 0:10] = 1.0
+    v, u = np.mgrid[10:30, -10:10].reshape(2, -1)
+    points = INTRINSICS.back_project(np.stack([u, v], axis=1).astype(float), np.ones(400))
+    validator = with_things(points, np.full(400, CUP), np.ones(400, int), drawn=1.0)
+    kept = validator.validate(boxes(((0.0, 11.0, 11.0, 30.0), CUP)), frame, np.eye(4)).detections
+    np.testing.assert_allclose(kept.xyxy, [(0.0, 10.5, 9.5, 29.5)])  # the whole cup's; of what is seen it begins at 0.5
+
+
+@pytest.mark.parametrize("wrong", [{"same": 0.0}, {"drawn": 1.1}, {"drawn": -0.1}, {"least_own": 0}])
+def test_numbers_of_things_out_of_range_are_refused(wrong):
     with pytest.raises(UserError):
         ValidationConfig(**wrong)
