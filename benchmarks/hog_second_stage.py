@@ -1,6 +1,6 @@
 """Learns the second stage of the HOG model that is shipped: it replaces that of detectors/hog/models/synthetic.npz.
 
-uv run python benchmarks/hog_second_stage.py --write            about half an hour on two cores
+uv run python benchmarks/hog_second_stage.py --write            about an hour on two cores
 uv run python benchmarks/hog_second_stage.py -o FILE.npz        the same, somewhere else
 
 The scenes are rendered ones of seeds that neither a benchmark nor the training of the templates uses.
@@ -25,7 +25,7 @@ from thingmap.detectors.hog.training.second_stage import SecondStageConfig, trai
 
 # preset, frames, pace, seeds of each level of clutter, frames from one that is looked at to the next
 SCENES = (
-    (Preset.TABLETOP, 30, 8.0, range(100, 124), 1),
+    (Preset.TABLETOP, 30, 8.0, range(100, 172), 2),
     (Preset.SURVEY, 37, 1.0, range(100, 106), 2),
     (Preset.KITCHEN, 112, 8.0, range(100, 102), 3),
 )
