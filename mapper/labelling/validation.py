@@ -90,23 +90,29 @@ class Validator:
         """
         check_classes(detections.classes, self.classes)
         in_front, uv, is_seen = project_points(self.points, frame, T_world_camera, self.config.tolerance)
-        seen, rows = uv[is_seen], in_front[is_seen]
-        stay = self._agrees(detections, seen, rows)
+        stay = self._agrees(detections, uv[is_seen], in_front[is_seen])
         kept, denied = detections.select(stay), int((~stay).sum())
-        if self.labels.instance is None or not len(kept):
+        if self.labels.instance is None:
             return Validated(kept, denied, 0)
-        instance, numbers = self.labels.instance, self.config
-        visible = ThingPixels(seen, instance[rows])
-        shown = shown_things(kept, self._claims(kept), visible, self.labels.label[rows], numbers.central)
-        whole = reaches(ThingPixels(uv, instance[in_front]), shown, numbers.least_own)
-        height, width = frame.depth.shape
-        extents = reaches(visible, shown, numbers.least_own), cut_to_image(whole, width, height)
-        anew = drawn_anew(kept.xyxy, extents, numbers.same, numbers.drawn)
+        shown, anew = self._drawn_to_things(kept, frame, uv, in_front, is_seen)
         is_drawn = ~np.isnan(anew[:, 0])
         single = ~doubles(kept, np.where(is_drawn, shown, 0))
         if kept.mask is None:
             kept = replace(kept, xyxy=np.where(is_drawn[:, None], anew, kept.xyxy))
         return Validated(kept.select(single), denied, int((~single).sum()))
+
+    def _drawn_to_things(
+        self, kept: Detections, frame: Frame, uv: np.ndarray, rows: np.ndarray, is_seen: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(D,) numbers of the things that boxes show, 0 for none, and (D, 4) boxes drawn to their points, or NaN."""
+        assert self.labels.instance is not None
+        config, least = self.config, self.config.least_own
+        whole = ThingPixels(uv, self.labels.instance[rows])
+        seen = ThingPixels(uv[is_seen], whole.number[is_seen])
+        shown = shown_things(kept, self._claims(kept), seen, self.labels.label[rows[is_seen]], config.central)
+        height, width = frame.depth.shape
+        extents = reaches(seen, shown, least), cut_to_image(reaches(whole, shown, least), width, height)
+        return shown, drawn_anew(kept.xyxy, extents, config.same, config.drawn)
 
     def agrees(self, detections: Detections, frame: Frame, T_world_camera: np.ndarray) -> np.ndarray:
         """(D,) bool: which of D detections the labels agree with.

@@ -188,6 +188,14 @@ def test_a_thing_is_found_once_and_drawn_midway_to_its_points():
     assert validated.detections.confidence.tolist() == [0.9]
 
 
+def test_nothing_found_stays_nothing():
+    points, labels = make_points()
+    none = with_things(points, labels, np.ones(len(labels), int)).validate(
+        Detections.empty(CLASSES), make_frame(), np.eye(4)
+    )
+    assert (len(none.detections), none.denied, none.doubled) == (0, 0, 0)
+
+
 def test_without_things_labels_alone_decide():
     found = boxes((ON_CUP, CUP), ((26.0, 18.0, 42.0, 34.0), CUP), (ON_CUP, BOWL))
     validated = make_validator(*make_points()).validate(found, make_frame(), np.eye(4))
