@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,14 +25,31 @@ def read_cloud(file: Path) -> tuple[np.ndarray, np.ndarray]:
     Raises:
         InputError: the file is absent or damaged.
     """
+    names = [name for name, _ in COLOR_FIELDS]
+    points, vertices, _ = read_vertices(file, "a coloured cloud in PLY", AGAIN, needed=names)
+    return points, np.stack([vertices[name] for name in names], axis=1)
+
+
+def read_vertices(
+    file: Path, expected: str, remedy: str, needed: Sequence[str] = ()
+) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """(M, 3) float64 points of a PLY, (M,) records with all properties of its vertices, and its comment lines.
+
+    Raises:
+        InputError: the file is absent or damaged, or a property is missing, which `expected` and `remedy` are said of.
+    """
     from plyfile import PlyData, PlyParseError
 
     try:
-        vertices = PlyData.read(str(file))["vertex"].data
+        content = PlyData.read(str(file))
+        vertices = content["vertex"].data
         points = np.stack([vertices[axis] for axis in "xyz"], axis=1).astype(np.float64)
-        return points, np.stack([vertices[name] for name, _ in COLOR_FIELDS], axis=1)
     except (OSError, KeyError, ValueError, PlyParseError) as error:
-        raise InputError(file, "a coloured cloud in PLY", str(error), AGAIN) from None
+        raise InputError(file, expected, str(error), remedy) from None
+    missing = [name for name in needed if name not in (vertices.dtype.names or ())]
+    if missing:
+        raise InputError(file, expected, f"vertices without {', '.join(missing)}", remedy)
+    return points, vertices, [*content.comments, *content["vertex"].comments]
 
 
 def coloured_vertices(points: np.ndarray, colors: np.ndarray, *more: tuple[str, str]) -> np.ndarray:

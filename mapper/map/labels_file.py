@@ -12,8 +12,9 @@ import numpy as np
 
 from ...datasets.errors import InputError
 from ...datasets.truth import NO_OBJECT
-from .cloud_file import coloured_vertices, write_vertices
+from .cloud_file import coloured_vertices, read_vertices, write_vertices
 
+A_CLOUD = "a labelled cloud in PLY"
 LABEL_AGAIN = "write it again with `thingmap label`"
 REMOVE = "write it again, or remove it"
 
@@ -87,20 +88,13 @@ def read_labels(file: Path, classes: Sequence[str]) -> tuple[np.ndarray, PointLa
     Raises:
         InputError: the file is damaged, or its labels are not of these classes.
     """
-    from plyfile import PlyData, PlyParseError
-
-    try:
-        content = PlyData.read(str(file))
-        vertices = content["vertex"].data
-        points = np.stack([vertices[axis] for axis in "xyz"], axis=1).astype(np.float64)
-    except (OSError, KeyError, ValueError, PlyParseError) as error:
-        raise InputError(file, "a labelled cloud in PLY", str(error), REMOVE) from None
+    points, vertices, comments = read_vertices(file, A_CLOUD, REMOVE)
     fields = vertices.dtype.names or ()
     field = next((name for name in ("label", "class") if name in fields), None)
     if field is None:
         found = "no such property"
         raise InputError(file, "an integer `label` for every vertex", found, "add it, or remove the file")
-    named = _named_labels(file, [*content.comments, *content["vertex"].comments], classes)
+    named = _named_labels(file, comments, classes)
     label = _labels_of(file, vertices, field, named, classes)
     instance = vertices["instance"].astype(np.int64) if "instance" in fields else None
     if not {"second", "margin"} <= set(fields):
@@ -115,19 +109,15 @@ def read_instances(file: Path) -> dict[str, np.ndarray]:
     Raises:
         InputError: the file is absent or damaged, or says of no point whose it is.
     """
-    from plyfile import PlyData, PlyParseError
-
+    points, vertices, comments = read_vertices(file, A_CLOUD, LABEL_AGAIN)
+    if "instance" not in (vertices.dtype.names or ()):
+        raise InputError(file, "an `instance` for every vertex", "no such property", LABEL_AGAIN)
+    number = vertices["instance"].astype(np.int64)
     try:
-        content = PlyData.read(str(file))
-        vertices = content["vertex"].data
-        if "instance" not in (vertices.dtype.names or ()):
-            raise InputError(file, "an `instance` for every vertex", "no such property", LABEL_AGAIN)
-        points = np.stack([vertices[axis] for axis in "xyz"], axis=1).astype(np.float64)
-        number = vertices["instance"].astype(np.int64)
-        lines = [line.split(maxsplit=2) for line in content.comments]
-        named = [(int(words[1]), str(json.loads(words[2]))) for words in lines if words[0] == "instance"]
-    except (OSError, LookupError, ValueError, PlyParseError) as error:
-        raise InputError(file, "a labelled cloud in PLY", str(error), LABEL_AGAIN) from None
+        lines = [line.split(maxsplit=2) for line in comments]
+        named = [(int(words[1]), str(json.loads(words[2]))) for words in lines if words[:1] == ["instance"]]
+    except (LookupError, ValueError) as error:
+        raise InputError(file, A_CLOUD, str(error), LABEL_AGAIN) from None
     order = np.argsort(number, kind="stable")
     ordered = number[order]
     ends = ((thing, *(np.searchsorted(ordered, n, side) for side in ("left", "right"))) for n, thing in named)

@@ -150,6 +150,15 @@ def test_cloud_is_binary_and_coloured(tmp_path):
     np.testing.assert_array_equal(read_colors, colors)
 
 
+def test_a_cloud_without_colours_is_named(tmp_path):
+    folder = OutputFolder.create(tmp_path / "out")
+    header = "ply\nformat ascii 1.0\nelement vertex 1\n"
+    header += "".join(f"property {kind}\n" for kind in ("float x", "float y", "float z", "uchar red"))
+    folder.cloud_file.write_text(header + "end_header\n1 2 3 4\n")
+    with pytest.raises(InputError, match=r"cloud\.ply.*without green, blue.*thingmap run"):
+        folder.read_cloud()
+
+
 def test_damaged_files_are_named(tmp_path):
     folder = OutputFolder.create(tmp_path)
     folder.cloud_file.write_text("no ply")
