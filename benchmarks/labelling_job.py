@@ -131,10 +131,9 @@ def check_detections(job: Job, case: Case, sequence: Sequence, validator: Valida
             continue
         frame = sequence[index]
         found = detector(frame)
-        pose = case.run.poses[row]
-        agreeing = found.select(validator.agrees(found, frame, pose))
-        validated = validator.validate(found, frame, pose).detections
-        for matches, some in ((before, found), (agreed, agreeing), (after, validated)):
+        validated = validator.validate(found, frame, case.run.poses[row])
+        agreeing = found.select(validated.agrees)
+        for matches, some in ((before, found), (agreed, agreeing), (after, validated.detections)):
             boxes = detected_boxes(some, case, case.truth.intrinsics)
             matches.append(match_boxes(boxes, true, case.config.box_iou, index))
     return scored(before), scored(agreed), scored(after)

@@ -33,13 +33,18 @@ class Validated:
 
     Attributes:
         detections: those that stay, in their order, drawn where their things' points say.
-        denied: how many are not what the labels say, and
-        doubled: how many show a thing that a better box of the same class shows too; neither stays.
+        agrees: (D,) bool, which of the D that were found are what the labels say; the others do not stay.
+        doubled: how many more do not, since a better box of the same class shows the same thing.
     """
 
     detections: Detections
-    denied: int
+    agrees: np.ndarray
     doubled: int
+
+    @property
+    def denied(self) -> int:
+        """How many are not what the labels say."""
+        return int((~self.agrees).sum())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,21 +90,25 @@ class Validator:
     def validate(self, detections: Detections, frame: Frame, T_world_camera: np.ndarray) -> Validated:
         """The detections that labels and things agree with; boxes that belong to masks are not drawn anew.
 
+        Labels agree with those whose label is that of most visible points in the middle; or may be that of half of
+        them, where these are not sure; or is that of enough points in the whole box; or where too few points are seen
+        to know. Of labels that are equally many, any may be the box's.
+
         Raises:
             UserError: the detector finds classes that the map does not have.
         """
         check_classes(detections.classes, self.classes)
         in_front, uv, is_seen = project_points(self.points, frame, T_world_camera, self.config.tolerance)
-        stay = self._agrees(detections, uv[is_seen], in_front[is_seen])
-        kept, denied = detections.select(stay), int((~stay).sum())
+        agrees = self._agrees(detections, uv[is_seen], in_front[is_seen])
+        kept = detections.select(agrees)
         if self.labels.instance is None:
-            return Validated(kept, denied, 0)
+            return Validated(kept, agrees, 0)
         shown, anew = self._drawn_to_things(kept, frame, uv, in_front, is_seen)
         is_drawn = ~np.isnan(anew[:, 0])
         single = ~doubles(kept, np.where(is_drawn, shown, 0))
         if kept.mask is None:
             kept = replace(kept, xyxy=np.where(is_drawn[:, None], anew, kept.xyxy))
-        return Validated(kept.select(single), denied, int((~single).sum()))
+        return Validated(kept.select(single), agrees, int((~single).sum()))
 
     def _drawn_to_things(
         self, kept: Detections, frame: Frame, uv: np.ndarray, rows: np.ndarray, is_seen: np.ndarray
@@ -113,20 +122,6 @@ class Validator:
         height, width = frame.depth.shape
         extents = reaches(seen, shown, least), cut_to_image(reaches(whole, shown, least), width, height)
         return shown, drawn_anew(kept.xyxy, extents, config.same, config.drawn)
-
-    def agrees(self, detections: Detections, frame: Frame, T_world_camera: np.ndarray) -> np.ndarray:
-        """(D,) bool: which of D detections the labels agree with.
-
-        Those whose label is that of most visible points in the middle; or may be that of half of them, where these are
-        not sure; or is that of enough points in the whole box; or where too few points are seen to know. Of labels that
-        are equally many, any may be the box's.
-
-        Raises:
-            UserError: the detector finds classes that the map does not have.
-        """
-        check_classes(detections.classes, self.classes)
-        in_front, uv, is_seen = project_points(self.points, frame, T_world_camera, self.config.tolerance)
-        return self._agrees(detections, uv[is_seen], in_front[is_seen])
 
     def _agrees(self, detections: Detections, uv: np.ndarray, rows: np.ndarray) -> np.ndarray:
         label, central = self.labels.label[rows], self.config.central

@@ -58,14 +58,14 @@ def boxes(*claims, classes=("cup", "bowl")) -> Detections:
 def test_boxes_stay_where_the_points_in_the_middle_agree():
     validator = make_validator(*make_points())
     found = boxes((ON_CUP, CUP), (ON_CUP, BOWL), (ON_WALL, CUP), (ON_WALL, BOWL))
-    assert validator.agrees(found, make_frame(), np.eye(4)).tolist() == [True, False, False, False]
+    assert validator.validate(found, make_frame(), np.eye(4)).agrees.tolist() == [True, False, False, False]
 
 
 def test_classes_are_told_by_name_and_not_by_number():
     found = boxes((ON_CUP, 1), (ON_CUP, 0), classes=("bowl", "cup"))
-    assert make_validator(*make_points()).agrees(found, make_frame(), np.eye(4)).tolist() == [True, False]
+    assert make_validator(*make_points()).validate(found, make_frame(), np.eye(4)).agrees.tolist() == [True, False]
     with pytest.raises(UserError, match="sofa"):
-        make_validator(*make_points()).agrees(boxes((ON_CUP, 0), classes=("sofa",)), make_frame(), np.eye(4))
+        make_validator(*make_points()).validate(boxes((ON_CUP, 0), classes=("sofa",)), make_frame(), np.eye(4))
 
 
 def test_a_box_stays_that_unsure_points_may_be_of():
@@ -78,17 +78,18 @@ def test_a_box_stays_that_unsure_points_may_be_of():
     for near, stays in ((0.5, [True, False, False]), (0.7, [False, False, False])):
         margin = np.where(on_cup & top, near, 1.2).astype(np.float32)
         validator = make_validator(points, background, second, margin, doubt=0.6, central=1.0)
-        assert validator.agrees(found, frame, np.eye(4)).tolist() == stays
+        assert validator.validate(found, frame, np.eye(4)).agrees.tolist() == stays
     by_labels_alone = make_validator(points, background, second, margin - 1.0, doubt=0.0, central=1.0)
-    assert not make_validator(points, background).agrees(found, frame, np.eye(4)).any()
-    assert by_labels_alone.agrees(found, frame, np.eye(4)).tolist() == [True, False, False]  # the evidence is a cup's
+    assert not make_validator(points, background).validate(found, frame, np.eye(4)).agrees.any()
+    # the evidence is a cup's
+    assert by_labels_alone.validate(found, frame, np.eye(4)).agrees.tolist() == [True, False, False]
 
 
 def test_only_the_middle_counts():
     wide = (12.0, 4.0, 52.0, 44.0)  # 40 x 40 pixels around the cup's 16 x 16
     frame, found = make_frame(), boxes((wide, CUP))
-    assert make_validator(*make_points(), central=0.4).agrees(found, frame, np.eye(4)).all()
-    assert not make_validator(*make_points(), central=0.9).agrees(found, frame, np.eye(4)).any()
+    assert make_validator(*make_points(), central=0.4).validate(found, frame, np.eye(4)).agrees.all()
+    assert not make_validator(*make_points(), central=0.9).validate(found, frame, np.eye(4)).agrees.any()
 
 
 def test_a_box_stays_whose_middle_is_hidden():
@@ -100,17 +101,18 @@ def test_a_box_stays_whose_middle_is_hidden():
     found = boxes((around, BOWL))
     for share, stays in ((0.1, True), (0.3, False)):
         validator = make_validator(points, labels, share=share)
-        assert validator.agrees(found, frame, np.eye(4)).tolist() == [stays]
+        assert validator.validate(found, frame, np.eye(4)).agrees.tolist() == [stays]
 
 
 def test_what_no_points_speak_of_stays():
     points, labels = make_points()
     nothing = make_validator(points[:0], labels[:0])
-    assert nothing.agrees(boxes((ON_CUP, BOWL)), make_frame(), np.eye(4)).all()
+    assert nothing.validate(boxes((ON_CUP, BOWL)), make_frame(), np.eye(4)).agrees.all()
     dark = make_frame()
     dark.depth[:] = 0.0
-    assert make_validator(points, labels).agrees(boxes((ON_CUP, BOWL)), dark, np.eye(4)).all()
-    assert make_validator(points, labels).agrees(Detections.empty(("cup",)), make_frame(), np.eye(4)).shape == (0,)
+    assert make_validator(points, labels).validate(boxes((ON_CUP, BOWL)), dark, np.eye(4)).agrees.all()
+    none = make_validator(points, labels).validate(Detections.empty(("cup",)), make_frame(), np.eye(4))
+    assert none.agrees.shape == (0,)
 
 
 def test_a_moved_camera_sees_the_same():
@@ -121,7 +123,7 @@ def test_a_moved_camera_sees_the_same():
     points, labels = make_points()
     validator = make_validator(points @ turn.T + T_world_camera[:3, 3], labels)
     found = boxes((ON_CUP, CUP), (ON_CUP, BOWL), (ON_WALL, CUP))
-    assert validator.agrees(found, make_frame(), T_world_camera).tolist() == [True, False, False]
+    assert validator.validate(found, make_frame(), T_world_camera).agrees.tolist() == [True, False, False]
 
 
 def test_only_what_the_depth_shows_is_visible():
