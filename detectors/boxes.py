@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+EDGE = 0.5  # pixels from the image's outer edge, where detectors count from, to the centre of the first pixel
+
 
 def areas(boxes: np.ndarray) -> np.ndarray:
     """(N,); 0 for a box without inside, and for NaN."""

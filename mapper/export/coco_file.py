@@ -18,12 +18,13 @@ from pathlib import Path
 from typing import Any
 
 from ...datasets.errors import UserError
+from ...detectors.boxes import EDGE
 from ..map.atomic import write_atomic
 from ..map.object_map import ObjectMap
 from ..map.store import OutputFolder
 from .chosen import read_things
 from .coco_images import MappedImage, drawn_images, open_images, read_images
-from .thing_boxes import EDGE, ThingBoxes, thing_boxes
+from .thing_boxes import ThingBoxes, thing_boxes
 
 MIN_VISIBILITY = 0.25  # share; the evaluator too blames nobody for what is hidden more than that
 

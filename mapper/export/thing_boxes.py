@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...datasets.frame import Intrinsics
+from ...detectors.boxes import EDGE
 from ...factors.visibility import TOLERANCE_M, VolumePart, measure_visibility
 from ..evaluation.boxes.projection import MIN_HALF_AXIS_M, project_cylinders
 from ..map.boxes import box_axes
 from ..map.thing import Thing
-
-EDGE = 0.5  # pixels from the centre of an image's first pixel to its outer edge
 
 
 @dataclass(frozen=True, slots=True, eq=False)

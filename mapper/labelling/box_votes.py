@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from ...datasets.truth import NO_OBJECT
+from ...detectors.boxes import EDGE
 
 
 def central_votes(xyxy: np.ndarray, uv: np.ndarray, label: np.ndarray, classes: int, central: float) -> np.ndarray:
@@ -19,7 +20,7 @@ def central_votes(xyxy: np.ndarray, uv: np.ndarray, label: np.ndarray, classes: 
         central: share of the width and height.
     """
     column = np.where(label == NO_OBJECT, classes, label)
-    middle, half = (xyxy[:, :2] + xyxy[:, 2:]) / 2.0 - 0.5, (xyxy[:, 2:] - xyxy[:, :2]) * central / 2.0
+    middle, half = (xyxy[:, :2] + xyxy[:, 2:]) / 2.0 - EDGE, (xyxy[:, 2:] - xyxy[:, :2]) * central / 2.0
     return _votes(middle - half, middle + half, uv, column, classes + 1)
 
 

@@ -11,11 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...detectors.boxes import box_ious
+from ...detectors.boxes import EDGE, box_ious
 from ...detectors.detections import Detections, Part
 from .box_votes import central_votes
-
-EDGE = 0.5  # pixels from the image's outer edge, where boxes count from, to the centre of the first pixel
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,11 +13,10 @@ import numpy as np
 from ....datasets.frame import Intrinsics
 from ....datasets.ground_truth import GroundTruth
 from ....datasets.truth import FrameTruth
+from ....detectors.boxes import EDGE
 from ....detectors.detections import Detections, Part
 from ..inputs.case import Case
 from ..result import NotEvaluated
-
-EDGE = 0.5  # pixels from the image's outer edge, where detectors count from, to the centre of the first pixel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
